@@ -70,6 +70,7 @@ struct Field {
     shade: vec4<f32>,
     // The magnitude of a field's gradient up to which its direction does not count. One over the
     // magnitudes from there to where it counts in full. Both in entries of the table per thickness.
+    // One over the depth behind clips from which gradients count in full.
     certain: vec4<f32>,
     // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared
     // extent in standard deviations; the minimum sum of kernels for which a value exists.

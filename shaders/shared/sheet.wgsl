@@ -39,6 +39,11 @@ fn turned(normal: vec3<f32>, direction: vec3<f32>, certain: vec2<f32>) -> vec3<f
     return normal * (certainty_of(normal, certain) * size);
 }
 
+// Returns a gradient of any length, towards the eye.
+fn towards_eye(r: u32, gradient: vec3<f32>) -> vec3<f32> {
+    return select(gradient, -gradient, dot(gradient, direction_of(r)) > 0.0);
+}
+
 // Returns the factor on a colour, and the highlight that is added to it, by Blinn's model (1977) on
 // both sides of a surface.
 fn light_of(
@@ -46,10 +51,11 @@ fn light_of(
     direction: vec3<f32>,
     shade: vec4<f32>,
     certain: vec2<f32>,
+    counts: f32,
     reaching: Reaching,
 ) -> vec2<f32> {
     let size = length(normal);
-    let share = certainty_of(normal, certain);
+    let share = counts * certainty_of(normal, certain);
     let facing = min(abs(dot(normal, direction)) / max(size, 1e-20), 1.0);
     let shown = 1.0 - share * (1.0 - facing);
     let gloss = share * shade.z * pow(max(facing, 1e-6), shade.w);
@@ -77,7 +83,7 @@ fn light_of(
 fn lit(r: u32, color: vec3<f32>, normal: vec3<f32>, distance: f32) -> vec3<f32> {
     let direction = direction_of(r);
     let reaching = reaching_at(r, distance, turned(normal, direction, CERTAIN));
-    let light = light_of(normal, direction, frame.surface_shade, CERTAIN, reaching);
+    let light = light_of(normal, direction, frame.surface_shade, CERTAIN, 1.0, reaching);
     return min(color * light.x + light.y, vec3(1.0));
 }
 
@@ -87,11 +93,12 @@ fn lit_field(
     f: u32,
     color: vec3<f32>,
     gradient: vec3<f32>,
+    counts: f32,
     reaching: Reaching,
 ) -> vec3<f32> {
     let shade = frame.fields[f].shade;
     let certain = frame.fields[f].certain.xy;
-    let light = light_of(gradient, direction_of(r), shade, certain, reaching);
+    let light = light_of(gradient, direction_of(r), shade, certain, counts, reaching);
     return min(color * light.x + light.y, vec3(1.0));
 }
 
@@ -118,7 +125,8 @@ fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
     let gradient = gradient_at(r, f, medium, place);
     let shade = frame.fields[f].shade;
     let certain = frame.fields[f].certain.xy;
-    return light_of(gradient, direction_of(r), shade, certain, medium.reaching);
+    let counts = share_at(medium, place);
+    return light_of(gradient, direction_of(r), shade, certain, counts, medium.reaching);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -215,6 +223,8 @@ struct Medium {
     along: vec3<f32>,
     // The light that reaches the middle of the sheet.
     reaching: Reaching,
+    // How far gradients count behind a clip: at the front, and its growth over the thickness.
+    share: vec2<f32>,
     // The largest value.
     peak: f32,
     // The distance at which an isosurface absorbed half of the light.
@@ -356,13 +366,35 @@ fn pass_surface(
     }
     var color = surface.color.xyz;
     if VOLUME_SHADED {
-        color = lit_field(r, f, color, gradient_at(r, f, *medium, place), (*medium).reaching);
+        let gradient = gradient_at(r, f, *medium, place);
+        color = lit_field(r, f, color, gradient, share_at(*medium, place), (*medium).reaching);
     }
     (*medium).color += share * color;
 }
 
-// Returns a field's medium of a sheet, inside the box of the samples and what the clips leave.
-fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
+// Returns how far the gradients of a sheet count behind the last clip before its end: at its front,
+// and the growth over its thickness.
+fn behind_clips(r: u32, f: u32, sheet: u32) -> vec2<f32> {
+    let span = span_of(sheet);
+    var entered = pixels[r].kept.x;
+    for (var i = 0u; i < HOLES; i++) {
+        let hole = pixels[r].holes[i];
+        entered = select(entered, max(entered, hole.y), hole.x < hole.y && hole.y < span.y);
+    }
+    return vec2(span.x - entered, span.y - span.x) * frame.fields[f].certain.z;
+}
+
+// Returns how far the gradient counts at a place of a sheet.
+fn share_at(medium: Medium, place: f32) -> f32 {
+    if CLIPS + HOLES == 0u {
+        return 1.0;
+    }
+    return clamp(medium.share.x + place * medium.share.y, 0.0, 1.0);
+}
+
+// Returns a field's medium of a sheet between two distances, inside the box of the samples and what
+// the clips leave.
+fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet, span: vec2<f32>) -> Medium {
     var medium: Medium;
     medium.through = 1.0;
     medium.peak = NO_VALUE;
@@ -379,13 +411,19 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
             medium.along = vec3(field.front.along, field.inside.along, field.back.along);
         }
     }
+    if VOLUME_SHADED && CLIPS + HOLES > 0u {
+        medium.share = behind_clips(r, f, sheet);
+    }
     if VOLUME_SHADED && LAMPS {
         let certain = frame.fields[f].certain.xy;
-        let normal = turned(gradient_at(r, f, medium, 0.5), direction_of(r), certain);
+        let mean = (towards_eye(r, gradient_at(r, f, medium, 0.0))
+            + towards_eye(r, gradient_at(r, f, medium, 0.5))
+            + towards_eye(r, gradient_at(r, f, medium, 1.0))) / 3.0;
+        let normal = share_at(medium, 0.5) * turned(mean, direction_of(r), certain);
         medium.reaching = reaching_at(r, planes[sheet] + 0.5 * medium.thickness, normal);
     }
-    var begin = max(planes[sheet], pixels[r].fields[f].inside.x);
-    let last = min(planes[sheet + 1u], pixels[r].fields[f].inside.y);
+    var begin = max(span.x, pixels[r].fields[f].inside.x);
+    let last = min(span.y, pixels[r].fields[f].inside.y);
     if HOLES == 0u {
         if begin < last {
             pass_piece(r, f, sheet, field, begin, last, &medium);
@@ -411,13 +449,20 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
     return medium;
 }
 
-// Adds a field's medium of a sheet to the mixture.
-fn mix_field(r: u32, f: u32, sheet: u32, field: Sheet, mixture: ptr<function, Mixture>) {
+// Adds a field's medium of a sheet between two distances to the mixture there.
+fn mix_field(
+    r: u32,
+    f: u32,
+    sheet: u32,
+    field: Sheet,
+    span: vec2<f32>,
+    mixture: ptr<function, Mixture>,
+) {
     // A gathered field may remain from sheets before the pass.
     if !field.has_value || !(GATHER || is_in_pass(sheet)) {
         return;
     }
-    var medium = pass_field(r, f, sheet, field);
+    var medium = pass_field(r, f, sheet, field, span);
     if MAXIMUM {
         pixels[r].hit = max(pixels[r].hit, medium.peak);
         return;
@@ -431,8 +476,13 @@ fn mix_field(r: u32, f: u32, sheet: u32, field: Sheet, mixture: ptr<function, Mi
     (*mixture).hit = min((*mixture).hit, medium.hit);
 }
 
-// Adds a sheet to the picture.
-fn composite(r: u32, sheet: u32, mixture: Mixture) {
+// Returns the distances of the planes around a sheet.
+fn span_of(sheet: u32) -> vec2<f32> {
+    return vec2(planes[sheet], planes[sheet + 1u]);
+}
+
+// Adds a sheet, or a part of one between two distances, to the picture.
+fn composite(r: u32, span: vec2<f32>, mixture: Mixture) {
     let depth = mixture.depth;
     if MAXIMUM || !(depth > LEAST_DIVISOR) {
         return;
@@ -444,10 +494,10 @@ fn composite(r: u32, sheet: u32, mixture: Mixture) {
     pixels[r].color += share / depth * premultiplied;
     // Inside the sheet, optical depth counts as evenly spread; an isosurface counts at its exact
     // place.
-    if mixture.hit < NO_HIT {
+    if mixture.hit < NO_HIT && before > 0.5 {
         pixels[r].hit = mixture.hit;
     } else if before > 0.5 && left <= 0.5 {
-        pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
+        pixels[r].hit = mix(span.x, span.y, log(2.0 * before) / depth);
     }
     pixels[r].transmittance = left;
 }

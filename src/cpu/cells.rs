@@ -556,6 +556,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
             weight: one,
             direction: rays.direction,
             sections: Some([front.across, middle, sum.back.across]),
+            share: None,
         };
         Some((layer, has_value))
     }

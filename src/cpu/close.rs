@@ -66,14 +66,13 @@ impl<S: Simd> Pixels<S> {
         }
     }
 
-    /// Records where half of the light is absorbed, if that is in a sheet with optical depth and
-    /// not on an isosurface in it. The sheet lies between two planes, and `before` is the light
-    /// that reaches it.
+    /// Records where half of the light is absorbed, if that is between two distances with optical
+    /// depth, and not on an isosurface there. `before` is the light that reaches the first.
     #[inline(always)]
     fn note_half(
         &mut self,
         simd: S,
-        [start, stop]: [f32; 2],
+        [start, stop]: [Lanes<S>; 2],
         before: Lanes<S>,
         depth: Lanes<S>,
         has_hit: mask32x8<S>,
@@ -274,7 +273,8 @@ impl Plan<'_> {
     ) -> [Lanes<S>; 3] {
         let on = (layer.direction, reaching);
         if is_steady {
-            let gradient = self.gradient(layer, (place + next_place) * 0.5);
+            let middle = (place + next_place) * 0.5;
+            let gradient = (self.gradient(layer, middle), layer.share_at(simd, middle));
             return self.lit_field(simd, color, gradient, on);
         }
         let none = Lanes::splat(simd, 0.0);
@@ -282,11 +282,30 @@ impl Plan<'_> {
         for number in 0..LIGHTS {
             let share = (number as f32 + 0.5) / LIGHTS as f32;
             let at = (next_place - place) * share + place;
-            let light = self.light_of(simd, self.gradient(layer, at), on);
+            let gradient = (self.gradient(layer, at), layer.share_at(simd, at));
+            let light = self.light_of(simd, gradient, on);
             sums = [sums[0] + light[0], sums[1] + light[1]];
         }
         let [share, highlight] = sums.map(|sum| sum * (1.0 / LIGHTS as f32));
         with_light(simd, color, share, highlight)
+    }
+
+    /// Returns how far the gradients of a sheet count behind the last clip before its end: at its
+    /// front, and the growth over its thickness.
+    #[inline(always)]
+    pub fn behind_clips<S: Simd>(
+        &self,
+        simd: S,
+        layer: &Layer<S>,
+        rays: &Rays<S>,
+    ) -> [Lanes<S>; 2] {
+        let mut entered = rays.kept[0];
+        for [from, to] in &rays.holes[..self.holes] {
+            let is_before = from.simd_lt(*to) & to.simd_lt(layer.start + layer.thickness);
+            entered = is_before.select(entered.max(*to), entered);
+        }
+        let per_depth = Lanes::splat(simd, self.field.per_depth);
+        [(layer.start - entered) * per_depth, layer.thickness * per_depth]
     }
 
     /// Adds the field in a sheet, at the pixels of a mask, to what lies in the sheet. In a maximum
@@ -320,19 +339,26 @@ impl Plan<'_> {
         media.mixed = Some(medium.mixed_with(simd, all));
     }
 
-    /// Adds a sheet to a packet's pixels.
+    /// Adds a sheet, or a part of one between two distances, to a packet's pixels.
     #[inline(always)]
-    pub fn close<S: Simd>(&self, simd: S, sheet: usize, packet: &mut Packet<S>, media: &Media<S>) {
+    pub fn close<S: Simd>(
+        &self,
+        simd: S,
+        span: [Lanes<S>; 2],
+        packet: &mut Packet<S>,
+        media: &Media<S>,
+    ) {
         let pixels = &mut packet.pixels;
         let none = Lanes::splat(simd, 0.0);
-        let planes = [self.planes[sheet], self.planes[sheet + 1]];
-        let (before, has_hit) = (pixels.through, media.has_hit);
+        let before = pixels.through;
+        // Facets may have taken half of the light since the media were added.
+        let has_hit = media.has_hit & before.simd_gt(0.5);
         pixels.hit = has_hit.select(media.hit, pixels.hit);
         if let Some(medium) = &media.only {
             // The field's colour is already composited within the sheet, so it is added as it is.
             pixels.color = three!(I => before.mul_add(medium.color[I], pixels.color[I]));
             pixels.through = before * medium.through;
-            pixels.note_half(simd, planes, before, medium.depth, has_hit);
+            pixels.note_half(simd, span, before, medium.depth, has_hit);
             return;
         }
         let Some([red, green, blue, depth]) = media.mixed else { return };
@@ -348,7 +374,7 @@ impl Plan<'_> {
         let per_depth = share / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
         pixels.color = three!(I => per_depth.mul_add(premultiplied[I], pixels.color[I]));
         pixels.through = before - share;
-        pixels.note_half(simd, planes, before, depth, has_hit);
+        pixels.note_half(simd, span, before, depth, has_hit);
     }
 
     /// Returns the effect of a sheet's field on light, inside the lattice's box and what the clips
@@ -541,7 +567,8 @@ impl Plan<'_> {
             let mut surface =
                 [0, 1, 2].map(|channel| of_met(up.color[channel], down.color[channel]));
             if self.is_lit {
-                let normal = self.gradient(layer, place + (next_place - place) * share);
+                let at = place + (next_place - place) * share;
+                let normal = (self.gradient(layer, at), layer.share_at(simd, at));
                 surface = self.lit_field(simd, surface, normal, (layer.direction, reaching));
             }
             for (sum, channel) in medium.color.iter_mut().zip(surface) {

@@ -153,17 +153,19 @@ struct Turned<S: Simd> {
 
 impl<S: Simd> Turned<S> {
     /// `low` is a magnitude up to which the normal does not count, and `per_magnitude` is one over
-    /// the magnitudes over which it comes to count in full.
+    /// the magnitudes over which it comes to count in full. `share` is a factor on that.
     #[inline(always)]
     fn new(
         simd: S,
         normal: [Lanes<S>; 3],
         direction: [Lanes<S>; 3],
         [low, per_magnitude]: [f32; 2],
+        share: Option<Lanes<S>>,
     ) -> Self {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let size = dot(normal, normal).sqrt();
         let certainty = ((size - low) * per_magnitude).max(none).min(one);
+        let certainty = share.map_or(certainty, |share| certainty * share);
         let certainty = size.simd_gt(LEAST_GRADIENT).select(certainty, none);
         let inverse = one / size.max(Lanes::splat(simd, LEAST_GRADIENT));
         let cosine = dot(normal, direction) * inverse;
@@ -220,7 +222,7 @@ impl Plan<'_> {
         (rays, distance): (&Rays<S>, Lanes<S>),
     ) -> [Lanes<S>; 3] {
         // From the smallest length on.
-        let turned = Turned::new(simd, normal, rays.direction, [0.0, 1e30]);
+        let turned = Turned::new(simd, normal, rays.direction, [0.0, 1e30], None);
         let reaching = Reaching::at(simd, self, rays, distance, &turned);
         let on = (&rays.direction, &reaching);
         let [share, highlight] =
@@ -234,9 +236,25 @@ impl Plan<'_> {
         if self.lamps.is_none() || !self.is_lit {
             return Reaching::all(simd);
         }
-        let gradient = self.gradient(layer, Lanes::splat(simd, 0.5));
-        let turned = Turned::new(simd, gradient, layer.direction, self.certain());
+        let gradient = self.towards_eye(simd, layer);
+        let share = layer.share_at(simd, Lanes::splat(simd, 0.5));
+        let turned = Turned::new(simd, gradient, layer.direction, self.certain(), share);
         Reaching::at(simd, self, rays, layer.thickness.mul_add(0.5, layer.start), &turned)
+    }
+
+    /// Returns the mean of the gradients at the front, in the middle and at the back of a sheet,
+    /// each turned towards the eye. Where a thin shell begins and ends in the sheet, the gradient
+    /// in the middle is short and may point anywhere.
+    #[inline(always)]
+    fn towards_eye<S: Simd>(&self, simd: S, layer: &Layer<S>) -> [Lanes<S>; 3] {
+        let none = Lanes::splat(simd, 0.0);
+        let mut sum = [none; 3];
+        for place in [0.0, 0.5, 1.0] {
+            let gradient = self.gradient(layer, Lanes::splat(simd, place));
+            let is_away = dot(gradient, layer.direction).simd_gt(none);
+            sum = three!(I => sum[I] + is_away.select(-gradient[I], gradient[I]));
+        }
+        three!(I => sum[I] * (1.0 / 3.0))
     }
 
     /// Returns the magnitude up to which gradients do not count, and one over the magnitudes over
@@ -247,12 +265,13 @@ impl Plan<'_> {
 
     /// Returns a lit colour of the field. The gradient counts from the magnitudes on that are
     /// certain, in entries per thickness of a sheet; others are lit the less the shorter they are.
+    /// With it comes how far it counts behind a clip.
     #[inline(always)]
     pub fn lit_field<S: Simd>(
         &self,
         simd: S,
         color: [Lanes<S>; 3],
-        gradient: [Lanes<S>; 3],
+        gradient: ([Lanes<S>; 3], Option<Lanes<S>>),
         on: ([Lanes<S>; 3], &Reaching<S>),
     ) -> [Lanes<S>; 3] {
         let [share, highlight] = self.light_of(simd, gradient, on);
@@ -264,10 +283,10 @@ impl Plan<'_> {
     pub fn light_of<S: Simd>(
         &self,
         simd: S,
-        gradient: [Lanes<S>; 3],
+        (gradient, share): ([Lanes<S>; 3], Option<Lanes<S>>),
         (direction, reaching): ([Lanes<S>; 3], &Reaching<S>),
     ) -> [Lanes<S>; 2] {
-        let turned = Turned::new(simd, gradient, direction, self.certain());
+        let turned = Turned::new(simd, gradient, direction, self.certain(), share);
         turned.light(simd, self.field.light, self.lamps.as_ref(), (&direction, reaching))
     }
 }

@@ -4,7 +4,7 @@
 use super::{
     bins::Entry,
     cells::{CellField, CellTile},
-    close::{Media, OPAQUE, Packet, Pixels},
+    close::{OPAQUE, Packet, Pixels},
     footprint::Record,
     gather::{Gather, Last},
     layer::Layer,
@@ -12,6 +12,7 @@ use super::{
     rays::{HIGH, PACKETS, Rays, WIDE},
     scatter::{OpenField, OpenTile, Window},
     skip::is_marked,
+    split::Split,
     sums::{ScalarSums, Sums, WINDOW, differences},
     tile_map::TileMap,
     vector::{apart, each, four, lanes, three},
@@ -369,22 +370,32 @@ impl March<'_> {
                     None => Some(part),
                 };
             }
-            let mut media = Media::new(simd, radiance);
+            let facets = sums.take_facets(simd, packet, sheet);
+            let split = Split::new(simd, planes, facets.as_ref());
+            let mut media = split.media(simd, radiance);
             for ((field, open), seen) in self.fields.iter().zip(fields.iter_mut()).zip(&mut *seen) {
                 let field_layer = field.layer(simd, packet, sheet, open, seen);
-                if let Some((layer, mask)) = &field_layer {
-                    field.plan.add_field(simd, (layer, *mask), packet, &mut media);
+                if let Some((mut layer, mask)) = field_layer {
+                    if field.plan.has_clips() {
+                        layer.share = Some(field.plan.behind_clips(simd, &layer, &packet.rays));
+                    }
+                    let ends = [layer.begin, layer.end];
+                    for (part, media) in media.iter_mut().take(split.parts).enumerate() {
+                        [layer.begin, layer.end] = split.within(part, ends);
+                        field.plan.add_field(simd, (&layer, mask), packet, media);
+                    }
                 }
             }
-            let facets = sums.take_facets(simd, packet, sheet);
-            if media.is_empty() && facets.is_none() {
+            if facets.is_none() && media[0].is_empty() {
                 continue;
             }
-            if !media.is_empty() {
-                plan.close(simd, sheet, packet, &media);
-            }
-            if let Some(facets) = &facets {
-                facets.absorb(simd, &mut packet.pixels);
+            for (part, media) in media.iter().take(split.parts).enumerate() {
+                if !media.is_empty() {
+                    plan.close(simd, split.span(part), packet, media);
+                }
+                if let Some(facets) = facets.as_ref().filter(|_| part == 0) {
+                    facets.absorb(simd, &mut packet.pixels);
+                }
             }
             if let Some((inside, before)) = region {
                 packet.pixels = packet.pixels.select(inside, before);

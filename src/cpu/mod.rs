@@ -64,6 +64,7 @@ mod rods;
 mod scatter;
 mod skip;
 mod spare;
+mod split;
 mod sums;
 mod tile_map;
 mod vector;

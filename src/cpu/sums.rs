@@ -84,6 +84,15 @@ impl<S: Simd> Cover<S> {
         let passes = before.simd_gt(half) & pixels.through.simd_le(half);
         pixels.hit = passes.select(self.distance, pixels.hit);
     }
+
+    /// Returns the distances between two planes at which the facets lie: the second plane where
+    /// there are none.
+    #[inline(always)]
+    pub fn place(&self, simd: S, [start, stop]: [f32; 2]) -> Lanes<S> {
+        let [start, stop] = [Lanes::splat(simd, start), Lanes::splat(simd, stop)];
+        let is_covered = self.share.simd_gt(0.0);
+        is_covered.select(self.distance.max(start).min(stop), stop)
+    }
 }
 
 /// The sums of splats that carry their own colour.
@@ -310,6 +319,7 @@ impl<S: Simd> ScalarSums<S> {
             weight: one,
             direction: rays.direction,
             sections: None,
+            share: None,
         };
         Some((layer, has_value))
     }

@@ -214,7 +214,7 @@ impl FrameField {
             low: wide_with(field.low, f32::from(field.is_on_lattice)),
             high: wide_with(field.high, f32::from(kernel.is_tabled)),
             shade: shade(field.light),
-            certain: [field.certain_from, field.per_certain, 0.0, 0.0],
+            certain: [field.certain_from, field.per_certain, field.per_depth, 0.0],
             isotropic: [deviation, per_deviation, radius2, field.least_sum],
             transfer: [zero, per_value, last, place],
             gradients: [first, per_magnitude, length, pixels],

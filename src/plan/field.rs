@@ -34,6 +34,8 @@ pub struct Field {
     pub certain_from: f32,
     /// One over the magnitudes from there to where the direction counts in full.
     pub per_certain: f32,
+    /// One over the depth behind clips from which gradients count in full, in world units.
+    pub per_depth: f32,
     pub values: Values<f32>,
     pub gradients: Gradients,
     /// Extinction times colour, and extinction, of values before the first table entry, and behind
@@ -86,12 +88,19 @@ pub struct Surface {
 
 /// Where the box of scattered samples ends, in all directions.
 const NOWHERE: f32 = 1e15;
+/// Behind clips, the gradients of fields without a lattice count at once.
+const AT_ONCE: f32 = 1e30;
 
 impl Field {
     /// Returns the field of an item, without its tables. `choice` is that of a volume in bricks.
     pub fn new(item: &Item, view: &View, settings: &Settings, choice: Option<&Choice>) -> Self {
-        let mut field =
-            Self { low: [-NOWHERE; 3], high: [NOWHERE; 3], levels: [1.0, 1.0], ..Self::default() };
+        let mut field = Self {
+            low: [-NOWHERE; 3],
+            high: [NOWHERE; 3],
+            levels: [1.0, 1.0],
+            per_depth: AT_ONCE,
+            ..Self::default()
+        };
         match item {
             Item::Scalar(set, _) => {
                 field.kernel.per_overlap = 1.0 / set.overlap;
@@ -176,6 +185,8 @@ impl Field {
         let margin = DVec3::select(samples.size().cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
         self.low = narrow(-margin);
         self.high = narrow(samples.size() + margin);
+        let depth = Shade::BEHIND_CLIPS * lattice.least_kernel_spacing();
+        self.per_depth = ((1.0 / depth) as f32).min(AT_ONCE);
         self.is_on_lattice = true;
     }
 

@@ -148,6 +148,7 @@ fn layer(parts: &[Part], thickness: f64) -> Option<Layer> {
         gradients: [Some(first.gradients[0]), Some(last.gradients[1])],
         middle: Some(0.5 * (first.gradients[0] + last.gradients[1])),
         filling: (covered / (span[1] - span[0])).min(1.0),
+        clipped: None,
     })
 }
 

@@ -35,6 +35,9 @@ pub(super) struct Layer {
     pub middle: Option<DVec3>,
     /// Factor on the extinction.
     pub filling: f64,
+    /// The distance of the last clip before the end of the sheet, and the depth behind it from
+    /// which gradients count in full. `None` without clips before.
+    pub clipped: Option<[f64; 2]>,
 }
 
 /// The field in a sheet, and the parts of the ray where it counts.
@@ -50,15 +53,16 @@ impl<'a> LitBy<'a> {
     fn new(layer: &Layer, field: &'a Field, (ray, lamps): (&Ray, Option<&Lamps>)) -> Self {
         let shade = field.shade.as_ref();
         let lamps = lamps.zip(shade).map(|(lamps, shade)| {
-            let gradient = layer.gradient(0.5, ray.direction);
+            let gradient = layer.towards_eye(ray.direction);
             let at = (ray, layer.distance(0.5));
+            let gradient = (gradient, layer.share(0.5));
             (lamps.lighting, lamps.reaching(gradient, at, shade))
         });
         Self { shade, lamps }
     }
 
     /// Returns a colour at a place with a gradient.
-    fn one(&self, color: DVec3, gradient: DVec3, direction: DVec3) -> DVec3 {
+    fn one(&self, color: DVec3, gradient: (DVec3, f64), direction: DVec3) -> DVec3 {
         self.shade.map_or(color, |shade| {
             shade::with_light(color, shade::light(gradient, direction, shade, &self.lamps))
         })
@@ -136,6 +140,16 @@ impl Layer {
         mixed + (along - mixed.dot(direction)) * direction
     }
 
+    /// Returns the mean of the gradients at the front, in the middle and at the back, each turned
+    /// towards the eye.
+    fn towards_eye(&self, direction: DVec3) -> DVec3 {
+        let turned = |place: f64| {
+            let gradient = self.gradient(place, direction);
+            if gradient.dot(direction) > 0.0 { -gradient } else { gradient }
+        };
+        (turned(0.0) + turned(0.5) + turned(1.0)) / 3.0
+    }
+
     /// Returns the colour of a part between two places in its mean light: gradients change more
     /// within a part than values do.
     fn lit(&self, lit: &LitBy, color: DVec3, [start, end]: [f64; 2], direction: DVec3) -> DVec3 {
@@ -143,11 +157,18 @@ impl Layer {
         let mut sums = [0.0; 2];
         for number in 0..LIGHTS {
             let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
-            let gradient = self.gradient(start + share * (end - start), direction);
+            let at = start + share * (end - start);
+            let gradient = (self.gradient(at, direction), self.share(at));
             let light = shade::light(gradient, direction, shade, &lit.lamps);
             (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
         }
         shade::with_light(color, sums)
+    }
+
+    /// Returns how far the gradient counts at a place.
+    fn share(&self, u: f64) -> f64 {
+        let behind = |[clip, depth]: [f64; 2]| ((self.distance(u) - clip) / depth).clamp(0.0, 1.0);
+        self.clipped.map_or(1.0, behind)
     }
 
     fn distance(&self, u: f64) -> f64 {
@@ -219,7 +240,7 @@ impl Layer {
                     span: [before, share].map(|share| self.distance(at(share))),
                 });
                 if let Some(surface) = surface {
-                    let gradient = self.gradient(at(share), direction);
+                    let gradient = (self.gradient(at(share), direction), self.share(at(share)));
                     let lit = lit_by.one(DVec3::from(surface.color), gradient, direction);
                     color += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;
@@ -244,7 +265,15 @@ mod tests {
     use glam::{DMat3, DVec2};
 
     fn layer(faces: [Option<f64>; 2], mean: f64) -> Layer {
-        Layer { span: [3.0, 5.0], mean, faces, gradients: [None; 2], middle: None, filling: 1.0 }
+        Layer {
+            span: [3.0, 5.0],
+            mean,
+            faces,
+            gradients: [None; 2],
+            middle: None,
+            filling: 1.0,
+            clipped: None,
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::{
     cells::Solids,
     classify::Classifier,
     clip,
-    composite::Added,
+    composite::{Added, Medium, Step},
     face::Face,
     field::{ClippedLayer, Field, Layer},
     gather,
@@ -19,7 +19,7 @@ use crate::{
     cells::Place,
     math::{self, Sheets, View},
     scene::{Classification, Evaluate, Gradient, Item, MOST_GATHERED, Optics, Settings},
-    volume::Lattice,
+    volume::{Lattice, Shade},
 };
 use glam::DVec3;
 
@@ -57,6 +57,21 @@ pub(super) struct Through<'r> {
 /// Whether sheets are so thin that the field in one is known from its faces and its middle.
 fn is_thin(sheets: &Sheets, lattice: &Lattice) -> bool {
     sheets.step <= MOST_GATHERED * lattice.least_kernel_spacing() * (1.0 + 1e-9)
+}
+
+/// Splits what a field adds evenly to a sheet at a distance.
+fn split((medium, steps): Added, place: f64) -> [Option<Added>; 2] {
+    let mut parts = [Vec::new(), Vec::new()];
+    for Step { depth, span: [from, to] } in steps {
+        let middle = place.clamp(from, to);
+        for (part, span) in parts.iter_mut().zip([[from, middle], [middle, to]]) {
+            part.push(Step { depth: depth * (span[1] - span[0]) / (to - from), span });
+        }
+    }
+    parts.map(|steps| {
+        let depth = steps.iter().map(|step| step.depth).sum();
+        Some((Medium { depth, ..medium }, steps))
+    })
 }
 
 impl<'a> Drawn<'a> {
@@ -162,11 +177,19 @@ impl<'a> Drawn<'a> {
             return solids.layers(frame, on.ray, on.allowed);
         }
         let Through { ray, kernels, allowed, .. } = *on;
+        let depth =
+            self.field.lattice.map(|lattice| Shade::BEHIND_CLIPS * lattice.least_kernel_spacing());
+        let clipped = |end: f64| {
+            let clips = allowed.iter().map(|[from, _]| *from).filter(|from| *from < end);
+            let last = clips.reduce(f64::max).filter(|last| last.is_finite());
+            last.zip(depth).map(|(clip, depth)| [clip, depth])
+        };
         if let (Some(labels), Some(lattice)) = (&self.labels, self.field.lattice) {
             let held = clip::intersection(allowed, clip::sample_box(ray, &frame.view, lattice));
             let layer = |span: [f64; 2]| {
                 let pieces = clip::intersection(&held, Some(span));
-                Some((labels.layer(ray, span, &pieces)?, pieces))
+                let layer = labels.layer(ray, span, &pieces)?;
+                Some((Layer { clipped: clipped(span[1]), ..layer }, pieces))
             };
             return (0..frame.count()).map(|k| layer(frame.span(k))).collect();
         }
@@ -196,24 +219,48 @@ impl<'a> Drawn<'a> {
                 gradients: [gradients[k], gradients[k + 1]],
                 middle: middles.get(k).and_then(|face| face.gradient(self.least_sum)),
                 filling: if is_full { 1.0 } else { (mean.weight / (to - from)).min(1.0) },
+                clipped: clipped(to),
             };
             Some((layer, pieces))
         };
         (0..frame.count()).map(layer).collect()
     }
 
-    /// Returns what the field adds to each sheet of a ray.
-    pub fn media(&self, frame: &Frame, on: &Through) -> Vec<Option<Added>> {
+    /// Returns what the field adds to each sheet of a ray, before the facets of the sheet and
+    /// behind them. `places` are the distances of the facets.
+    pub fn media(
+        &self,
+        frame: &Frame,
+        on: &Through,
+        places: &[Option<f64>],
+    ) -> Vec<[Option<Added>; 2]> {
         let lit = (on.ray, frame.lamps.as_ref());
-        let shine = |(layer, pieces): ClippedLayer| layer.shine(&self.field, lit, &pieces);
-        let mut media: Vec<Option<Added>> = match &self.solids {
+        let shine = |(layer, pieces): &ClippedLayer, place: f64| {
+            [[f64::NEG_INFINITY, place], [place, f64::INFINITY]].map(|part| {
+                let pieces = clip::intersection(pieces, Some(part));
+                (!pieces.is_empty()).then(|| layer.shine(&self.field, lit, &pieces))
+            })
+        };
+        let places = places.iter().map(|place| place.unwrap_or(f64::INFINITY));
+        let mut media: Vec<[Option<Added>; 2]> = match &self.solids {
             Some(solids) if solids.place() == Place::Cells => {
-                solids.media(frame, &self.field, on.ray, on.allowed)
+                let whole = solids.media(frame, &self.field, on.ray, on.allowed);
+                let halves = |(added, place): (Option<Added>, f64)| {
+                    added.map_or([None, None], |added| split(added, place))
+                };
+                whole.into_iter().zip(places).map(halves).collect()
             }
-            _ => self.layers(frame, on).into_iter().map(|layer| layer.map(shine)).collect(),
+            _ => {
+                let layers = self.layers(frame, on).into_iter().zip(places);
+                let halves = |(layer, place): (Option<ClippedLayer>, f64)| {
+                    layer.map_or([None, None], |layer| shine(&layer, place))
+                };
+                layers.map(halves).collect()
+            }
         };
         if frame.optics == Optics::XRay {
-            media.iter_mut().flatten().for_each(|(medium, _)| medium.color = DVec3::ONE);
+            let all = media.iter_mut().flatten().flatten();
+            all.for_each(|(medium, _)| medium.color = DVec3::ONE);
         }
         media
     }

@@ -32,28 +32,36 @@ struct FieldRow<'f> {
 /// What a pixel's ray meets in a sheet.
 pub(super) struct PixelSheet {
     surface: Medium,
-    /// The media of fields.
-    media: Vec<Added>,
+    /// The media of fields, before the facets and behind them.
+    media: Vec<[Option<Added>; 2]>,
     cover: Cover,
 }
 
 impl PixelSheet {
     /// Composites the sheet, which lies between two distances: the radiance and the media of the
-    /// fields, then the facets.
-    pub fn add(&self, composite: &mut Composite, span: [f64; 2]) {
-        let present = self.media.iter().filter(|(medium, _)| medium.depth > 0.0);
-        let present: Vec<&Added> = present.collect();
+    /// fields, and the facets where they lie.
+    pub fn add(&self, composite: &mut Composite, [from, to]: [f64; 2]) {
+        let Some((filled, distance, color)) = self.cover.mean() else {
+            return self.pass(composite, 0, [from, to], 1.0);
+        };
+        let place = distance.clamp(from, to);
+        let share = (place - from) / (to - from);
+        self.pass(composite, 0, [from, place], share);
+        composite.cover(filled, distance, color);
+        self.pass(composite, 1, [place, to], 1.0 - share);
+    }
+
+    /// Composites what lies in a part of the sheet, with its share of the radiance.
+    fn pass(&self, composite: &mut Composite, part: usize, span: [f64; 2], share: f64) {
+        let present = self.media.iter().filter_map(|parts| parts[part].as_ref());
+        let present: Vec<&Added> = present.filter(|(medium, _)| medium.depth > 0.0).collect();
+        let surface = Medium { depth: self.surface.depth * share, ..self.surface };
         match present[..] {
-            [(medium, steps)] if self.surface.depth <= 0.0 => {
-                composite.pass_in_steps(*medium, steps);
-            }
+            [(medium, steps)] if surface.depth <= 0.0 => composite.pass_in_steps(*medium, steps),
             _ => {
-                let all = present.iter().fold(self.surface, |all, (medium, _)| all.with(*medium));
+                let all = present.iter().fold(surface, |all, (medium, _)| all.with(*medium));
                 composite.pass(all, span);
             }
-        }
-        if let Some((filled, distance, color)) = self.cover.mean() {
-            composite.cover(filled, distance, color);
         }
     }
 }
@@ -167,13 +175,17 @@ impl Frame<'_> {
     /// facets.
     pub(super) fn sheets_of_pixel(&self, column: i64, row: &Row) -> Vec<PixelSheet> {
         self.with_fields(column, row, |ray, allowed, fields| {
-            let mut media: Vec<_> =
-                fields.iter().map(|(drawn, on)| drawn.media(self, on).into_iter()).collect();
+            let covers = self.covers([column, row.number], &row.facets);
+            let place = |cover: &Cover| cover.mean().map(|(_, distance, _)| distance);
+            let mut places: Vec<Option<f64>> = covers.iter().map(place).collect();
+            places.resize(self.count(), None);
+            let of_field = |(drawn, on): &(&Drawn, Through)| drawn.media(self, on, &places);
+            let mut media: Vec<_> = fields.iter().map(of_field).map(Vec::into_iter).collect();
             let lights = self.lights(ray, &row.kernels, allowed);
-            let mut covers = self.covers([column, row.number], &row.facets).into_iter();
+            let mut covers = covers.into_iter();
             let sheet = |(k, light): (usize, &Light)| PixelSheet {
                 surface: self.surface(light, (ray, 0.5 * (self.planes[k] + self.planes[k + 1]))),
-                media: media.iter_mut().filter_map(|sheets| sheets.next().flatten()).collect(),
+                media: media.iter_mut().filter_map(Iterator::next).collect(),
                 cover: covers.next().unwrap_or_default(),
             };
             lights.iter().enumerate().map(sheet).collect()

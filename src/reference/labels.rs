@@ -89,6 +89,7 @@ impl<'a> LabelMap<'a> {
             gradients: [Some(gradient); 2],
             middle: Some(gradient),
             filling: 1.0,
+            clipped: None,
         })
     }
 }

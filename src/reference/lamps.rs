@@ -87,14 +87,20 @@ impl Lamps {
         (ray, distance): (&Ray, f64),
         shade: &Shade,
     ) -> DVec3 {
-        let reaching = self.reaching(normal, (ray, distance), shade);
+        let reaching = self.reaching((normal, 1.0), (ray, distance), shade);
         let lit = Some((self.lighting, reaching));
-        shade::with_light(color, shade::light(normal, ray.direction, shade, &lit))
+        shade::with_light(color, shade::light((normal, 1.0), ray.direction, shade, &lit))
     }
 
     /// Returns the light at a distance along a ray, before a surface with a normal of any length.
-    pub fn reaching(&self, normal: DVec3, (ray, distance): (&Ray, f64), shade: &Shade) -> Reaching {
-        let normal = shade::certain_normal(normal, ray.direction, shade);
+    /// With the normal comes how far it counts.
+    pub fn reaching(
+        &self,
+        (normal, share): (DVec3, f64),
+        (ray, distance): (&Ray, f64),
+        shade: &Shade,
+    ) -> Reaching {
+        let normal = share * shade::certain_normal(normal, ray.direction, shade);
         let out = normal - (1.0 - normal.length()) * ray.direction;
         let to_world = self.view.rotation.transpose();
         let world = |step: f64| {

@@ -169,9 +169,13 @@
 //!
 //! With S the sum of all shares, the second mean counts by x² with x = S − 1, clamped to 0 … 1. So
 //! facets side by side mix by their shares, and a surface that fills a part x of the pixel in front
-//! of another shows by x. A facet whose place is clipped away does not count. Behind the rest of
-//! its sheet, a share a adds x·c to C, and x to A, with x = o·min(1 − A, a·(1 − A + A·o⁴)) and o
-//! the opacity, 1 without images.
+//! of another shows by x. A facet whose place is clipped away does not count. A share a adds x·c to
+//! C, and x to A, with x = o·min(1 − A, a·(1 − A + A·o⁴)) and o the opacity, 1 without images.
+//!
+//! Facets divide what else is in their sheet, at the mean of their distances weighted by
+//! share·exp(−min(60, 4·p)). The parts of fields before it count in front of them, and the others
+//! behind. Radiance, and cells with one value each, are spread evenly over the sheet: a linear
+//! share counts in front.
 //!
 //! So what fills the rest of a pixel in another sheet leaves no gap if it is opaque, and takes its
 //! share of the light that is left if it is clear. A facet that shows an image has the mean colour
@@ -230,7 +234,8 @@
 //!
 //! These are taken at a place before the surface: 2.5 times the step of their lattice along
 //! c·n − (1 − c)·b̂. The surface is a facet at its own distance, the radiance of a sheet in its
-//! middle, or a field in the middle of its sheet, for all of the sheet.
+//! middle, or a field in the middle of its sheet, for all of the sheet. A field's normal is there
+//! the mean of its gradients at the front, in the middle and at the back, each turned to the eye.
 //!
 //! T and S come from maps: pictures along the light, in a cube of as many planes as pixels around
 //! the scene. In a map each sheet meets all of the light. Its optical depth, 16 at most, grows

@@ -23,7 +23,7 @@ const MOST_OPEN: f64 = 2.0;
 /// parts of the colour count in full. If the shade says which gradients are certain, `normal` is a
 /// gradient in value per world length, and others are lit the less the shorter they are.
 pub(super) fn lit(color: DVec3, normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
-    with_light(color, light(normal, ray, shade, &None))
+    with_light(color, light((normal, 1.0), ray, shade, &None))
 }
 
 /// Returns a colour in light: a factor on it, and the highlight that is added to it.
@@ -51,10 +51,16 @@ fn certainty_of(normal: DVec3, shade: &Shade) -> f64 {
     }
 }
 
-/// Returns the factor on a colour and the highlight of [`lit`], or with other lights.
-pub(super) fn light(normal: DVec3, ray: DVec3, shade: &Shade, lit: &Lit) -> [f64; 2] {
+/// Returns the factor on a colour and the highlight of [`lit`], or with other lights. With the
+/// normal comes how far it counts.
+pub(super) fn light(
+    (normal, share): (DVec3, f64),
+    ray: DVec3,
+    shade: &Shade,
+    lit: &Lit,
+) -> [f64; 2] {
     let Shade { ambient, diffuse, specular, power, .. } = *shade;
-    let certain = certainty_of(normal, shade);
+    let certain = share * certainty_of(normal, shade);
     let normal = towards(normal, ray);
     let shown = |cosine: f64| 1.0 - certain * (1.0 - cosine);
     // The light comes from the eye, so the half vector is the light's own direction.

@@ -8,7 +8,7 @@ use super::{Items, PictureEntry, Subject};
 use crate::{
     Error, Result,
     math::Camera,
-    picture::Picture,
+    picture::{Outlines, Picture},
     scene::{Item, Scene, Settings},
 };
 
@@ -23,6 +23,8 @@ pub struct Drawing {
     pub edge_width: f64,
     /// The strength of eye-dome lighting; 0 without it.
     pub eye_dome: f64,
+    /// Lines along outlines, in pixels of the finished picture.
+    pub outlines: Option<Outlines>,
 }
 
 /// The smallest opacity that a file of 8 bits keeps.
@@ -39,6 +41,7 @@ impl PictureEntry {
             factor: self.factor(scene),
             edge_width: self.edge_width(),
             eye_dome: self.eye_dome.unwrap_or_else(|| usual_eye_dome(scene)),
+            outlines: self.outlines(),
         })
     }
 
@@ -78,20 +81,22 @@ impl Drawing {
         [width.saturating_sub(margins).max(1), height]
     }
 
-    /// Lights a drawn picture by its depths, averages it down, and draws the edges of its items
-    /// over it.
+    /// Lights a drawn picture by its depths, outlines what it shows, averages it down, and draws the
+    /// edges of its items over it.
     ///
     /// # Errors
     /// Those of [`Camera::view`], of [`Picture::reduced`] and of [`Items::draw_edges`].
-    pub fn reduced(&self, picture: Picture, items: &Items, camera: &Camera) -> Result<Picture> {
-        let picture = if self.eye_dome > 0.0 {
-            let view = camera.view([picture.width, picture.height])?;
+    pub fn reduced(&self, mut picture: Picture, items: &Items, camera: &Camera) -> Result<Picture> {
+        let view = camera.view([picture.width, picture.height])?;
+        if self.eye_dome > 0.0 {
             // As wide in large pictures as in usual ones.
             let radius = (picture.height / 720).max(self.factor).max(1);
-            picture.with_eye_dome(&view, self.eye_dome, radius)
-        } else {
-            picture
-        };
+            picture = picture.with_eye_dome(&view, self.eye_dome, radius);
+        }
+        if let Some(Outlines { width, color }) = self.outlines {
+            let outlines = Outlines { width: width * f64::from(self.factor), color };
+            picture = picture.with_outlines(&view, &outlines);
+        }
         let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
         let edges = (&self.settings.clips[..], self.edge_width);
         items.draw_edges(&mut picture, camera, edges)?;
@@ -121,6 +126,7 @@ mod tests {
             factor: 2,
             edge_width: 1.0,
             eye_dome: 0.0,
+            outlines: None,
         };
         assert_eq!(drawing.free(0), [40, 20]);
         assert_eq!(drawing.free(3), [28, 20]);

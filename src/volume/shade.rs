@@ -40,6 +40,10 @@ impl Default for Shade {
 const FAINT: [f64; 2] = [0.02, 0.1];
 
 impl Shade {
+    /// Behind a clip, gradients count the more the deeper a place lies, in full from this depth on,
+    /// in sample spacings along the ray. So a cut face shows its values, and not their noise.
+    pub(crate) const BEHIND_CLIPS: f64 = 2.0;
+
     /// Checks that the numbers can be drawn. The error is a message.
     pub(crate) fn check(&self) -> Result<(), String> {
         let Self { ambient, diffuse, specular, power, certain } = self;

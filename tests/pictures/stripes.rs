@@ -1,12 +1,14 @@
-//! Flat faces and lit ridges show no stripe for each sheet.
+//! Flat faces, lit ridges and surfaces in a medium show no stripe for each sheet, and cut faces no
+//! noise.
 
 use crate::testing::psnr::measured;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use splatkit::{
     cpu::CpuRenderer,
     math::{Camera, Kernel, Projection},
     picture::Picture,
-    scene::{Scene, Settings},
+    scene::{Clip, ClipShape, Scene, Settings},
+    surface::{Mesh, SurfelOptions},
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume, phantoms::Phantom},
 };
 
@@ -117,4 +119,64 @@ fn lit_materials_that_turn_opaque_have_no_contours() {
     let agreement = measured(&default, &thin);
     println!("an opaque material: {agreement:.1} dB, lines of {strongest:.2} / 255");
     assert!(strongest < 4.0, "{strongest:.2} / 255");
+}
+
+/// A slanted surface in a medium passes a plane between two sheets every few pixels. If all of a
+/// sheet's medium counted in front of its facets, each plane would draw a line.
+#[test]
+fn a_surface_in_a_medium_looks_as_in_thin_sheets() {
+    let top = |x: f32| Vec3::new(31.0 * x, 18.0 + 5.0 * (x - 0.5), 0.0);
+    let corner = |x: f32, z: f32| top(x) + 31.0 * z * Vec3::Z;
+    let mesh = Mesh {
+        positions: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let facets = mesh.facets(&SurfelOptions::default()).expect("facets").expect("of a small mesh");
+    let transfer = TransferFunction {
+        color: vec![(0.0, [0.9, 0.3, 0.1])],
+        opacity: vec![(0.0, 0.25)],
+        unit: 1.0,
+        shade: None,
+        ..TransferFunction::default()
+    };
+    let medium = volume(|_, _| 100);
+    let scene = Scene::new().with_volume(medium, Kernel::default(), transfer).with_facets(facets);
+    let agreement = measured(&drawn(&scene, None), &drawn(&scene, Some(1.0 / 16.0)));
+    println!("a surface in a medium: {agreement:.1} dB");
+    assert!(agreement > 50.0, "{agreement:.1} dB");
+}
+
+/// Where a clip cuts a lit, opaque and noisy material open, its face shows the values: noise has no
+/// normals. Behind, surfaces are lit as without the clip.
+#[test]
+fn cut_faces_are_even() {
+    let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729) % 101) as u8 % 13;
+    let volume = volume(|x, y| 120 + noise(x, y));
+    let transfer = |shade: Option<Shade>| TransferFunction {
+        color: vec![(0.0, [0.8, 0.6, 0.4])],
+        opacity: vec![(60.0, 0.0), (100.0, 0.95)],
+        unit: 0.5,
+        shade,
+        ..TransferFunction::default()
+    };
+    let middle = 0.5 * (SIDE - 1) as f64;
+    let clip =
+        Clip { shape: ClipShape::HalfSpace { normal: DVec3::Y, offset: middle }, inside: true };
+    let drawn = |shade: Option<Shade>| {
+        let scene = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer(shade));
+        let settings = Settings { clips: vec![clip], ..Settings::new([96, 96]) };
+        let mut renderer = CpuRenderer::new(&scene).expect("a scene");
+        renderer.render(&camera(), &settings).expect("a picture").0
+    };
+    let shade = Shade { certain: Some([0.0, 0.0]), specular: 0.0, ..Shade::default() };
+    // What is lit from the front has this share of its colour.
+    let share = (shade.ambient + shade.diffuse) as f32;
+    let (lit, plain) = (drawn(Some(shade)), drawn(None));
+    let mut most = 0.0f32;
+    for (lit, plain) in lit.color.iter().zip(&plain.color) {
+        most = most.max((lit[0] - share * plain[0]).abs());
+    }
+    println!("a cut face: {most}");
+    assert!(most < 0.1, "{most}");
 }

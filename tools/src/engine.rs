@@ -6,7 +6,7 @@ use splatkit::{
     Device,
     gpu::{AdapterChoice, Budget, Gpu},
     scene::{self, Item, Scene},
-    session::{self, Description, LightName, PictureEntry},
+    session::{self, ColorEntry, Description, LightName, PictureEntry},
 };
 use std::time::Duration;
 
@@ -87,6 +87,19 @@ pub struct EngineFlags {
         value_parser = parse::not_negative
     )]
     eye_dome: Option<f64>,
+    /// Draw lines around what stands in front of something farther away, of this width in pixels.
+    #[arg(
+        long,
+        value_name = "WIDTH",
+        num_args = 0..=1,
+        default_missing_value = "1.5",
+        value_parser = parse::not_negative
+    )]
+    outline: Option<f64>,
+    /// Set the colour of these lines; that of the background makes halos [default: black, or white
+    /// on a dark background]
+    #[arg(long, value_name = "COLOR")]
+    outline_color: Option<ColorEntry>,
     /// Set the largest thickness of a sheet, in world units [default: 4/3 of a volume's sample
     /// spacing; half of that if the volume is sharp; two spacings if its kernel is linear]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
@@ -296,6 +309,8 @@ impl EngineFlags {
         picture.light = self.light.map(Into::into).or(picture.light);
         picture.shadows = self.shadows.or(picture.shadows);
         picture.eye_dome = self.eye_dome.or(picture.eye_dome);
+        picture.outline = self.outline.or(picture.outline);
+        picture.outline_color = self.outline_color.or(picture.outline_color);
         picture.ambient_occlusion = self.ambient_occlusion.or(picture.ambient_occlusion);
         picture.sheet_thickness = self.sheet_thickness.or(picture.sheet_thickness);
         if self.cut.is_some() || self.budget.is_some() || self.frame_time.is_some() {

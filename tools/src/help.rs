@@ -151,8 +151,8 @@ mod tests {
         (
             "Engine",
             "size engine gpu gpu-timeout gpu-memory pass-entries gradient evaluate shade no-shade \
-            light shadows ambient-occlusion eye-dome sheet-thickness cut budget frame-time memory \
-            cull-backfaces no-occlusion reference",
+            light shadows ambient-occlusion eye-dome outline outline-color sheet-thickness cut \
+            budget frame-time memory cull-backfaces no-occlusion reference",
         ),
         ("Method", "mode back-to-front classify optics mip x-ray"),
         ("Clipping", "clip cut-out"),

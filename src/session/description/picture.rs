@@ -1,6 +1,6 @@
 //! How a picture is drawn, as a description says it.
 
-use super::{Background, ClipEntry, LightName, PaperLength, appearance::Wrong};
+use super::{Background, ClipEntry, ColorEntry, LightName, PaperLength, appearance::Wrong};
 use crate::{
     Error, Result,
     hierarchy::Detail,
@@ -78,6 +78,13 @@ pub struct PictureEntry {
     /// without normals. By default 1 for a scene of dots without normals alone, else 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub eye_dome: Option<f64>,
+    /// The width of lines along the outlines of what stands in front of something farther away, in
+    /// pixels; by default none are drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outline: Option<f64>,
+    /// Their colour; by default black, or white on a dark background.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outline_color: Option<ColorEntry>,
     /// The largest thickness of a sheet, in world units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet_thickness: Option<f64>,
@@ -344,9 +351,12 @@ impl PictureEntry {
         self.background.map_or(Some([0.0; 3]), Background::color)
     }
 
-    /// Returns how many pixels are drawn along each side of a pixel of the picture.
+    /// Returns how many pixels are drawn along each side of a pixel of the picture. Outlines follow
+    /// the depths, which have smooth edges only if there are several for a pixel.
     pub fn factor(&self, scene: &Scene) -> u32 {
-        self.samples.unwrap_or(Samples::Auto).factor(self.size(), scene.has_splats())
+        let factor = self.samples.unwrap_or(Samples::Auto).factor(self.size(), scene.has_splats());
+        let has_lines = self.outlines().is_some() && self.samples.is_none();
+        if has_lines { factor.max(2) } else { factor }
     }
 
     /// Returns whether meshes can be drawn as facets: in sheets that emit and absorb light.

@@ -226,6 +226,10 @@ class Method(TypedDict, total=False):
     ambient_occlusion: float
     #: How far pixels beside nearer ones are dimmed, about 1.
     eye_dome: float
+    #: The width of lines around what stands in front of something farther away, in pixels.
+    outline: float
+    #: Their colour.
+    outline_color: Color
     #: Shapes that cut the scene.
     clips: Sequence[Clip]
     #: How gradients are made.
@@ -304,6 +308,8 @@ class RenderOptions(SourceOptions, Page, total=False):
     shadows: bool
     ambient_occlusion: float
     eye_dome: float
+    outline: float
+    outline_color: Color
     gradient: str
     evaluate: str
     sheet_thickness: float

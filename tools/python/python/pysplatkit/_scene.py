@@ -507,6 +507,8 @@ class Scene:
         shadows: bool | None = None,
         ambient_occlusion: float | None = None,
         eye_dome: float | None = None,
+        outline: float | None = None,
+        outline_color: Color | None = None,
         clips: Sequence[Clip] | None = None,
         gradient: str | None = None,
         evaluate: str | None = None,
@@ -565,6 +567,9 @@ class Scene:
                 from 0 to 1. Default: 1 for studio and sky, else 0.
             eye_dome: How far pixels beside nearer ones are dimmed, about 1: for clouds without
                 normals. Default: 0.
+            outline: The width of lines around what stands in front of something farther away, in
+                pixels. Default: none.
+            outline_color: Their colour. Default: black, or white on a dark background.
             clips: Shapes that cut the scene.
             gradient: How gradients are made (docs/volumes.md).
             evaluate: Where fields are evaluated (docs/volumes.md).
