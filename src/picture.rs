@@ -5,10 +5,12 @@ mod encoding;
 #[cfg(feature = "pictures")]
 mod exr;
 mod eye_dome;
+mod layers;
 
 pub use edges::Edges;
 pub(crate) use encoding::{DPI, wrong_dpi};
 pub use encoding::{Encoding, PictureFormat};
+pub use layers::Layers;
 
 use crate::{Error, Result, disk};
 use std::path::Path;

@@ -4,6 +4,7 @@
 mod axes;
 pub(super) mod files;
 mod segments;
+mod slice;
 mod write;
 
 use super::{
@@ -26,7 +27,8 @@ pub use write::{write, write_bytes};
 
 /// Reads a volume of three axes of space. A fourth axis may have colours, the components of vectors
 /// ([`ReadOptions::scalar`]), or times and other lists ([`ReadOptions::time`]); `kinds` says so, or
-/// the options do. Positions are in the file's own space. If that is a patient's (`space:
+/// the options do. A file of two axes of space is a volume of one slice. Positions are in the
+/// file's own space. If that is a patient's (`space:
 /// left-posterior-superior`, LPS, RAS or LAS), the volume is turned into the frame of
 /// [`Frame::Patient`](crate::about::Frame). Without `space directions`, the axes are x, y and z
 /// with the steps in `spacings`, or 1 where those are missing or NaN.
@@ -228,6 +230,7 @@ impl<'a> Header<'a> {
                 }
             }
         }
+        header.deepen();
         Ok((header, at))
     }
 

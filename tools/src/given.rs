@@ -57,6 +57,7 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("neighbours", SAMPLES),
     ("no-slopes", SAMPLES),
     ("channels", LATTICE),
+    ("split-channels", LATTICE),
     ("transfer", FIELD),
     ("opacity-unit", FIELD),
     ("iso", FIELD),

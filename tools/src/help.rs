@@ -141,7 +141,7 @@ mod tests {
         ("Kernel", "kernel sigma extent sharp"),
         ("Page", "title viewer"),
         ("Animation", "turntable path times fps"),
-        ("Figures", "width height dpi views columns panel-labels"),
+        ("Figures", "width height dpi views split-channels columns panel-labels"),
         ("Texts", "scalar-bar axes scale-bar caption"),
         (
             "Camera",
