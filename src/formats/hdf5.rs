@@ -66,8 +66,9 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
 
 /// Reads the data set that [`ReadOptions::dataset`] names (`group/name`), as a volume; otherwise
 /// the largest of three dimensions, or if there is none of two, which is a picture. Its last
-/// dimension is x ([`npy::read_volume`] says what a fourth one means). Storage may be contiguous, compact or in chunks, with the filters deflate,
-/// shuffle, Fletcher-32, LZF and scale-offset.
+/// dimension is x ([`npy::read_volume`] says what a fourth one means). Storage may be
+/// contiguous, compact or in chunks, with the filters deflate, shuffle, Fletcher-32, LZF and
+/// scale-offset.
 ///
 /// Image data of VTKHDF are read as such: with their origin, spacing and directions, and the array
 /// that [`ReadOptions::scalar`] names.

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    about::Modality,
     input::{Source, copy},
     volume::{Arrangement, Lattice, Volume},
 };
@@ -62,6 +63,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     if let Some(unit) = header.length_unit() {
         volume.about.length = unit;
     }
+    // 3D Slicer copies the element of DICOM.
+    let stated = ["modality", "DICOM_0008_0060_Modality"].map(|key| header.keys.get(key));
+    volume.about.modality = stated.into_iter().flatten().find_map(|name| Modality::named(name));
     Ok(match segments::table(&header.keys) {
         Some(table) => volume.with_labels(table),
         None => volume,

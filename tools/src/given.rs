@@ -53,6 +53,8 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("scalar", MESH | CLOUD | LATTICE | SAMPLES | CELLS),
     ("missing", VOLUME | SAMPLES | CELLS),
     ("labels", VOLUME),
+    ("modality", VOLUME),
+    ("opacity-from", VOLUME),
     ("radius", SAMPLES),
     ("neighbours", SAMPLES),
     ("no-slopes", SAMPLES),

@@ -47,7 +47,9 @@ impl Header<'_> {
 /// Returns the directions of two axes in the plane or in space with a third one, which is normal
 /// to them. `None` for other texts, of which the reader says what is wrong.
 fn deep_directions(text: &str) -> Option<String> {
-    let parts: Vec<&str> = text.split_inclusive([')', ' ']).map(str::trim).collect();
+    // “none (1,0) (0, 1)” without spaces inside of brackets.
+    let joined = text.split(',').map(str::trim).collect::<Vec<_>>().join(",").replace(')', ") ");
+    let parts: Vec<&str> = joined.split_ascii_whitespace().collect();
     let vectors = parts.iter().filter(|part| part.starts_with('('));
     let in_space = |part: &&str| match vector::<2>(part) {
         Some([x, y]) => Some(DVec3::new(x, y, 0.0)),
@@ -58,7 +60,7 @@ fn deep_directions(text: &str) -> Option<String> {
     let normal = first.cross(second).try_normalize()? * first.length();
     let mut rest = [first, second].into_iter();
     let mut words: Vec<String> = Vec::new();
-    for part in parts.into_iter().filter(|part| !part.is_empty()) {
+    for part in parts {
         words.push(match part.starts_with('(') {
             true => written(rest.next()?),
             false => part.to_owned(),
@@ -109,8 +111,8 @@ mod tests {
 
     #[test]
     fn slices_lie_in_their_space() {
-        let plane = "dimension: 2\nsizes: 2 1\nspace dimension: 2\nspace directions: (0,2) (-3, 0)\n\
-                     space origin: (5,6)";
+        let plane = "dimension: 2\nsizes: 2 1\nspace dimension: 2\n\
+                     space directions: (0,2)(-3, 0)\nspace origin: (5,6)";
         let volume = slice(plane, &[1, 2]);
         assert_eq!(volume.lattice.position(DVec3::X), DVec3::new(5.0, 8.0, 0.0));
         assert_eq!(volume.lattice.axes.z_axis, DVec3::new(0.0, 0.0, 2.0));

@@ -231,6 +231,10 @@ impl Description {
             Some(files) => reading.open_held(path, bytes_of(files, path)?, attribute)?,
         };
         let mut data = opened.read()?;
+        if let Some(glyphs) = &showing.glyphs {
+            let scale = showing.glyph_scale.unwrap_or(1.0);
+            data = Data::Mesh(opened.glyphs(&data, glyphs, scale)?);
+        }
         opened.give_radii(&mut data, showing.point_radius.as_deref())?;
         input.transform.apply(path, &mut data)?;
         let (is_raw, files, facts) = (opened.is_raw(), opened.files(), opened.cheap_facts(&data)?);
