@@ -545,9 +545,10 @@ impl Adding<'_> {
     fn add_colors_of_two(&mut self, mut volume: Volume) -> Result<()> {
         let Self { name, showing, .. } = *self;
         let Some(opacities) = volume.opacities.take() else { return self.add_volume(volume) };
-        if let Some(shown) = showing.appearance.color_by_two(name, &mut volume, &opacities)? {
+        let colored = showing.appearance.color_by_two(name, &mut volume, &opacities)?;
+        if let Some(transfer) = colored {
             let title = Legend::title(&volume.about.name, &volume.about.unit);
-            self.values(&shown, volume.range, title, volume.about.labels.as_ref());
+            self.values(&transfer, volume.range, title, volume.about.labels.as_ref());
         }
         self.add_colors(&volume)
     }

@@ -101,11 +101,11 @@ mod tests {
         let name = Name { text: "a".into(), is_file: true };
         let ball = volume(|at| if at.length() < 0.6 { 100.0 } else { 0.0 });
         let mut colored = volume(|at| at.x as f32);
-        let shown = Appearance::default().color_by_two(&name, &mut colored, &ball).unwrap();
+        let transfer = Appearance::default().color_by_two(&name, &mut colored, &ball).unwrap();
         let colors = colored.colors.as_deref().unwrap();
         let [inside, outside] = [[SIDE / 2; 3], [1; 3]].map(|[i, j, k]| i + SIDE * (j + SIDE * k));
         assert!(colors[inside][3] > 100 && colors[outside][3] == 0, "{:?}", colors[inside]);
-        let transfer = shown.unwrap();
+        let transfer = transfer.unwrap();
         let byte = |part: f64| (255.0 * part).round() as u8;
         assert_eq!(colors[inside][..3], transfer.color(colored.value(inside)).map(byte));
         // The colours follow the values, also where nothing is seen of them.
