@@ -166,7 +166,9 @@ pub struct Orientation {
 }
 
 /// What measured a volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Modality {
     /// Computed tomography in Hounsfield units: air −1000, water 0.
@@ -179,6 +181,39 @@ pub enum Modality {
     Ultrasound,
     /// Light or electron microscopy.
     Microscopy,
+}
+
+impl Modality {
+    /// All modalities.
+    pub const ALL: [Self; 5] =
+        [Self::Ct, Self::Mr, Self::Emission, Self::Ultrasound, Self::Microscopy];
+
+    /// Returns its name: ct, mr, emission, ultrasound or microscopy.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ct => "ct",
+            Self::Mr => "mr",
+            Self::Emission => "emission",
+            Self::Ultrasound => "ultrasound",
+            Self::Microscopy => "microscopy",
+        }
+    }
+
+    /// Returns the modality of a name, or of the codes of DICOM and the suffixes of BIDS.
+    pub fn named(name: &str) -> Option<Self> {
+        let name = name.trim().to_ascii_lowercase();
+        let is_of = |names: &[&str]| names.contains(&name.as_str());
+        if is_of(&["mr", "t1w", "t2w", "flair", "pdw", "t2starw", "bold", "dwi", "sbref", "swi"]) {
+            return Some(Self::Mr);
+        }
+        if is_of(&["pt", "pet", "nm", "spect"]) {
+            return Some(Self::Emission);
+        }
+        if is_of(&["us", "ivus"]) {
+            return Some(Self::Ultrasound);
+        }
+        Self::ALL.into_iter().find(|modality| modality.name() == name)
+    }
 }
 
 impl Orientation {

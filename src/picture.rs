@@ -5,11 +5,13 @@ mod encoding;
 #[cfg(feature = "pictures")]
 mod exr;
 mod eye_dome;
+mod layers;
 mod outlines;
 
 pub use edges::Edges;
 pub(crate) use encoding::{DPI, wrong_dpi};
 pub use encoding::{Encoding, PictureFormat};
+pub use layers::Layers;
 pub use outlines::Outlines;
 
 use crate::{Error, Result, disk};

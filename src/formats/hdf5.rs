@@ -14,7 +14,9 @@ use super::{
     npy::{self, Shaped},
     shared::{grid::Element, listing},
 };
-use crate::{Result, cells::Cells, input::Source, surface::Mesh, volume::Volume};
+use crate::{
+    Result, about::Orientation, cells::Cells, input::Source, surface::Mesh, volume::Volume,
+};
 use attributes::Attributes;
 use coordinates::Coordinates;
 use file::{File, StoredSet};
@@ -63,9 +65,10 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
 }
 
 /// Reads the data set that [`ReadOptions::dataset`] names (`group/name`), as a volume; otherwise
-/// the largest of three dimensions. Its last dimension is x ([`npy::read_volume`] says what a
-/// fourth one means). Storage may be contiguous, compact or in chunks, with the filters deflate,
-/// shuffle, Fletcher-32, LZF and scale-offset.
+/// the largest of three dimensions, or if there is none of two, which is a picture. Its last
+/// dimension is x ([`npy::read_volume`] says what a fourth one means). Storage may be
+/// contiguous, compact or in chunks, with the filters deflate, shuffle, Fletcher-32, LZF and
+/// scale-offset.
 ///
 /// Image data of VTKHDF are read as such: with their origin, spacing and directions, and the array
 /// that [`ReadOptions::scalar`] names.
@@ -108,7 +111,11 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let mut volume = npy::volume_of(source, &shaped, data.into(), &options)?;
     attributes.apply(source, &mut volume)?;
     if let Some(dimensions) = shaped.space() {
-        coordinates.apply(source, &file, &mut volume, dimensions, &options)?;
+        let are_placed = coordinates.apply(source, &file, &mut volume, dimensions, &options)?;
+        if are_placed && shaped.is_picture() {
+            // Coordinates ascend upwards, whatever the order of the rows is.
+            volume.about.orientation = Some(Orientation::Y_UP);
+        }
     }
     Ok(volume)
 }
@@ -164,9 +171,12 @@ fn chosen<'a>(
     let samples = |set: &&StoredSet| set.shape.iter().fold(1u64, |all, &n| all.saturating_mul(n));
     // Of several that are as large, the first.
     let volumes = sets.iter().filter(is_volume).rev();
-    volumes.max_by_key(samples).ok_or_else(|| {
+    let is_picture = |set: &&StoredSet| shaped(source, set).is_ok_and(|shaped| shaped.is_picture());
+    let pictures = || sets.iter().filter(is_picture).rev().max_by_key(samples);
+    volumes.max_by_key(samples).or_else(pictures).ok_or_else(|| {
+        let message = "has neither numbers of three dimensions nor a picture of two; it has";
         source
-            .error("file", format!("has no numbers of three dimensions; it has {}", list()))
+            .error("file", format!("{message} {}", list()))
             .hint("choose a data set with --dataset, and one of several times with --time")
     })
 }

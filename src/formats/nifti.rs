@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     Result,
+    about::Modality,
     input::Source,
     volume::{Samples, Volume},
     warning,
@@ -216,6 +217,7 @@ fn volume(
         colors::attach(&mut volume, colors);
     }
     describe(&mut volume, header, is_stated);
+    volume.about.modality = modality(header_file.path, header);
     Ok(if header.intent == LABELS { volume.with_labels(Vec::new()) } else { volume })
 }
 
@@ -231,6 +233,18 @@ fn describe(volume: &mut Volume, header: &Header, is_stated: bool) {
     if place::millimetres(header).is_some() {
         about.length = "mm".into();
     }
+}
+
+/// Returns what measured the values, as the name of a file in a data set of BIDS says
+/// (`sub-01_T1w.nii.gz`), or the times of echoes in the description (dcm2niix, SPM).
+fn modality(path: &Path, header: &Header) -> Option<Modality> {
+    let name = path.file_name()?.to_string_lossy();
+    let stem = name.split('.').next().unwrap_or_default();
+    let of_bids = |(entities, suffix): (&str, &str)| {
+        entities.starts_with("sub-").then(|| Modality::named(suffix)).flatten()
+    };
+    let has_echo = || ["TE=", "TR="].iter().any(|time| header.description.contains(time));
+    stem.rsplit_once('_').and_then(of_bids).or_else(|| has_echo().then_some(Modality::Mr))
 }
 
 /// Returns the components to read: one, or all of a vector.

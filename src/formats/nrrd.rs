@@ -4,6 +4,7 @@
 mod axes;
 pub(super) mod files;
 mod segments;
+mod slice;
 mod write;
 
 use super::{
@@ -15,6 +16,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    about::Modality,
     input::{Source, copy},
     volume::{Arrangement, Lattice, Volume},
 };
@@ -26,7 +28,8 @@ pub use write::{write, write_bytes};
 
 /// Reads a volume of three axes of space. A fourth axis may have colours, the components of vectors
 /// ([`ReadOptions::scalar`]), or times and other lists ([`ReadOptions::time`]); `kinds` says so, or
-/// the options do. Positions are in the file's own space. If that is a patient's (`space:
+/// the options do. A file of two axes of space is a volume of one slice. Positions are in the
+/// file's own space. If that is a patient's (`space:
 /// left-posterior-superior`, LPS, RAS or LAS), the volume is turned into the frame of
 /// [`Frame::Patient`](crate::about::Frame). Without `space directions`, the axes are x, y and z
 /// with the steps in `spacings`, or 1 where those are missing or NaN.
@@ -60,6 +63,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     if let Some(unit) = header.length_unit() {
         volume.about.length = unit;
     }
+    // 3D Slicer copies the element of DICOM.
+    let stated = ["modality", "DICOM_0008_0060_Modality"].map(|key| header.keys.get(key));
+    volume.about.modality = stated.into_iter().flatten().find_map(|name| Modality::named(name));
     Ok(match segments::table(&header.keys) {
         Some(table) => volume.with_labels(table),
         None => volume,
@@ -228,6 +234,7 @@ impl<'a> Header<'a> {
                 }
             }
         }
+        header.deepen();
         Ok((header, at))
     }
 

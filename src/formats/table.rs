@@ -391,7 +391,10 @@ pub static FORMATS: &[Format] = &[
         name: "HDF5, NetCDF-4, VTKHDF",
         extensions: &["h5", "hdf5", "hdf", "he5", "nc4", "ims", "vtkhdf"],
         holds: &[
-            some(Content::Volume, "data sets of three dimensions, image data of VTKHDF"),
+            some(
+                Content::Volume,
+                "data sets of three dimensions, or pictures of two, image data of VTKHDF",
+            ),
             some(Content::Cells, "unstructured grids of VTKHDF"),
             some(Content::Mesh, "surfaces of VTKHDF"),
         ],

@@ -1,6 +1,6 @@
 //! Picture files: formats, bits and resolution.
 
-use super::Picture;
+use super::{Layers, Picture};
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub struct Encoding {
     /// Bits a channel; `None` for the usual number of the format, the first of
     /// [`PictureFormat::bits`].
     pub bits: Option<u32>,
-    /// Pixels an inch, which says how large the picture is printed. WebP does not store it.
+    /// Pixels an inch, which says how large the picture is printed.
     pub dpi: Option<f64>,
 }
 
@@ -120,6 +120,20 @@ impl Encoding {
         }
     }
 
+    /// Refuses layers that the format cannot store.
+    ///
+    /// # Errors
+    /// [`Error::Argument`].
+    pub fn check_layers(&self, has_layers: bool) -> Result<()> {
+        if !has_layers || self.format == PictureFormat::OpenExr {
+            return Ok(());
+        }
+        Err(Error::Argument(format!(
+            "layers: a .{} file has no layers; write an .exr file",
+            self.format.extension()
+        )))
+    }
+
     /// Returns bits a channel.
     pub(super) fn bits(&self) -> u32 {
         self.bits.unwrap_or(self.format.bits()[0])
@@ -141,8 +155,19 @@ impl Picture {
     /// [`Error::Argument`] if the format cannot store the picture or has no such bits, if this
     /// build lacks the format, or if the picture does not have one colour for each pixel.
     pub fn encode(&self, encoding: &Encoding) -> Result<Vec<u8>> {
+        self.encode_with(encoding, &Layers::default())
+    }
+
+    /// Returns the bytes of a picture file that has layers beside colours and depths.
+    ///
+    /// # Errors
+    /// Those of [`encode`](Self::encode); [`Error::Argument`] if the format has no layers, or if a
+    /// layer does not have one value for each pixel.
+    pub fn encode_with(&self, encoding: &Encoding, layers: &Layers) -> Result<Vec<u8>> {
         self.check_colors()?;
         encoding.check()?;
+        encoding.check_layers(!layers.is_empty())?;
+        layers.check(self)?;
         match encoding.format {
             PictureFormat::Png => self.encode_png(encoding),
             PictureFormat::Jpeg => self.encode_jpeg(encoding),
@@ -151,7 +176,7 @@ impl Picture {
             #[cfg(feature = "pictures")]
             PictureFormat::WebP => self.encode_webp(encoding),
             #[cfg(feature = "pictures")]
-            PictureFormat::OpenExr => self.encode_exr(encoding),
+            PictureFormat::OpenExr => self.encode_exr(encoding, layers),
             #[cfg(not(feature = "pictures"))]
             other => Err(Error::Argument(format!(
                 "this build writes no .{}: it lacks the feature `pictures`",
@@ -201,8 +226,11 @@ impl Picture {
     fn encode_webp(&self, encoding: &Encoding) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let rgba = self.to_rgba8(encoding.background);
-        let (encoder, kind) =
-            (image_webp::WebPEncoder::new(&mut bytes), image_webp::ColorType::Rgba8);
+        let kind = image_webp::ColorType::Rgba8;
+        let mut encoder = image_webp::WebPEncoder::new(&mut bytes);
+        if let Some(dpi) = encoding.dpi {
+            encoder.set_exif_metadata(exif(dpi));
+        }
         encoder.encode(&rgba, self.width, self.height, kind).map_err(not_stored)?;
         Ok(bytes)
     }
@@ -236,6 +264,33 @@ pub(super) fn png(
     writer.write_image_data(data).map_err(not_stored)?;
     writer.finish().map_err(not_stored)?;
     Ok(bytes)
+}
+
+/// Returns the metadata (Exif) that state a resolution in pixels an inch: a TIFF without a picture,
+/// of one directory.
+#[cfg(feature = "pictures")]
+fn exif(dpi: f64) -> Vec<u8> {
+    const X_RESOLUTION: u16 = 282;
+    const Y_RESOLUTION: u16 = 283;
+    const RESOLUTION_UNIT: u16 = 296;
+    const SHORT: u16 = 3;
+    const RATIONAL: u16 = 5;
+    const INCH: u32 = 2;
+    // The head takes 8 bytes, the directory 2 for its length, 12 an entry and 4 for its end.
+    const END: u32 = 8 + 2 + 3 * 12 + 4;
+    let mut bytes = b"II*\0\x08\0\0\0\x03\0".to_vec();
+    let entries = [
+        (X_RESOLUTION, RATIONAL, END),
+        (Y_RESOLUTION, RATIONAL, END),
+        (RESOLUTION_UNIT, SHORT, INCH),
+    ];
+    for (tag, kind, value) in entries {
+        bytes.extend([tag, kind].into_iter().flat_map(u16::to_le_bytes));
+        bytes.extend([1, value].into_iter().flat_map(u32::to_le_bytes));
+    }
+    bytes.extend(0u32.to_le_bytes());
+    bytes.extend([(dpi * 1000.0).round() as u32, 1000].into_iter().flat_map(u32::to_le_bytes));
+    bytes
 }
 
 /// Returns the bytes of a TIFF file.
@@ -324,6 +379,14 @@ mod tests {
     }
 
     #[test]
+    fn layers_are_stored_in_openexr_alone() {
+        let layers = Layers { identifiers: Some(vec![1; 4]), ..Layers::default() };
+        let error = row().encode_with(&Encoding::new(PictureFormat::Png), &layers).unwrap_err();
+        assert!(error.to_string().contains("layers: a .png file has no layers"), "{error}");
+        assert!(row().encode_with(&Encoding::new(PictureFormat::Png), &Layers::default()).is_ok());
+    }
+
+    #[test]
     fn png_files_have_bits_opacity_and_a_resolution() {
         for bits in [8, 16] {
             let encoding = Encoding { bits: Some(bits), ..encoding(PictureFormat::Png, None) };
@@ -399,6 +462,9 @@ mod tests {
             let mut read = vec![0; decoder.output_buffer_size().unwrap()];
             decoder.read_image(&mut read).unwrap();
             let wanted = row().to_rgba8(background);
+            let exif = decoder.exif_metadata().unwrap().expect("a resolution");
+            assert_eq!(exif.len(), 58);
+            assert_eq!(exif[50..], [[0xe0, 0x93, 4, 0], [0xe8, 3, 0, 0]].concat()[..]);
             let is_opaque = !decoder.has_alpha();
             assert_eq!(read, if is_opaque { opaque(&wanted) } else { wanted });
             assert!(!is_opaque || background.is_some());

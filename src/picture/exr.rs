@@ -1,6 +1,6 @@
-//! OpenEXR files: colours in linear light, and depths.
+//! OpenEXR files: colours in linear light, depths, and layers beside them.
 
-use super::{Encoding, Picture, encoding::not_stored};
+use super::{Encoding, Layers, Picture, encoding::not_stored};
 use crate::Result;
 use exr::prelude::{
     AnyChannel, AnyChannels, FlatSamples, Image, Layer, LayerAttributes, WritableImage, f16,
@@ -9,23 +9,25 @@ use exr::prelude::{
 impl Picture {
     /// Returns the bytes of an OpenEXR file of one part, with the channels R, G, B and A, and Z if
     /// the picture has depths. R, G and B are multiplied by A, in linear light with the primaries
-    /// of sRGB. Z is the depth in world units, infinite where the picture has none.
-    pub(super) fn encode_exr(&self, encoding: &Encoding) -> Result<Vec<u8>> {
-        let pixels: Vec<[f32; 4]> =
+    /// of sRGB. Z is the depth in world units, infinite where the picture has none. Layers have
+    /// channels of their own: `albedo.R`, `normal.X`, `id.I` and so on.
+    pub(super) fn encode_exr(&self, encoding: &Encoding, layers: &Layers) -> Result<Vec<u8>> {
+        let colors: Vec<[f32; 4]> =
             self.color.iter().map(|pixel| linear(*pixel, encoding.background)).collect();
-        let channel = |name: &str, part: usize| {
-            let values = pixels.iter().map(|pixel| pixel[part]);
-            let samples = match encoding.bits() {
-                16 => FlatSamples::F16(values.map(f16::from_f32).collect()),
-                _ => FlatSamples::F32(values.collect()),
-            };
-            AnyChannel::new(name, samples)
-        };
-        let colors = [("R", 0), ("G", 1), ("B", 2), ("A", 3)];
-        let mut channels: Vec<_> =
-            colors.into_iter().map(|(name, part)| channel(name, part)).collect();
+        let bits = encoding.bits();
+        let mut channels = parts_of(&colors, ["R", "G", "B", "A"], bits);
         if self.depth.len() == self.color.len() {
             channels.push(AnyChannel::new("Z", FlatSamples::F32(self.depth.clone())));
+        }
+        if let Some(normals) = &layers.normals {
+            channels.extend(parts_of(normals, ["normal.X", "normal.Y", "normal.Z"], bits));
+        }
+        if let Some(albedo) = &layers.albedo {
+            let albedo: Vec<[f32; 4]> = albedo.iter().map(|pixel| linear(*pixel, None)).collect();
+            channels.extend(parts_of(&albedo, ["albedo.R", "albedo.G", "albedo.B"], bits));
+        }
+        if let Some(identifiers) = &layers.identifiers {
+            channels.push(AnyChannel::new("id.I", FlatSamples::U32(identifiers.clone())));
         }
         let mut attributes = LayerAttributes {
             software_name: Some("splatkit".into()),
@@ -42,6 +44,23 @@ impl Picture {
         Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(not_stored)?;
         Ok(bytes.into_inner())
     }
+}
+
+/// Returns the channels of the first parts of pixels.
+fn parts_of<const N: usize, const M: usize>(
+    pixels: &[[f32; M]],
+    names: [&str; N],
+    bits: u32,
+) -> Vec<AnyChannel<FlatSamples>> {
+    let channel = |(part, name): (usize, &str)| {
+        let values = pixels.iter().map(|pixel| pixel[part]);
+        let samples = match bits {
+            16 => FlatSamples::F16(values.map(f16::from_f32).collect()),
+            _ => FlatSamples::F32(values.collect()),
+        };
+        AnyChannel::new(name, samples)
+    };
+    names.into_iter().enumerate().map(channel).collect()
 }
 
 /// Returns a pixel in linear light, multiplied by its opacity, over a background.
@@ -111,5 +130,27 @@ mod tests {
             assert_eq!(over[0].1, [1.0; 4]);
             assert!((over[3].1[1] - decoded(0.75)).abs() < near && over[3].1[2] == 1.0);
         }
+    }
+
+    #[test]
+    fn layers_are_channels_beside_the_colours() {
+        let picture =
+            Picture { width: 2, height: 1, color: vec![[0.5; 4]; 2], depth: vec![1.0; 2] };
+        let layers = Layers {
+            normals: Some(vec![[0.0, 0.6, -0.8], [0.0; 3]]),
+            albedo: Some(vec![[0.5, 1.0, 0.0, 1.0], [0.0; 4]]),
+            identifiers: Some(vec![70_000, 0]),
+        };
+        let encoding = Encoding::new(PictureFormat::OpenExr);
+        let (stored, _) = channels(&picture.encode_with(&encoding, &layers).unwrap());
+        let of = |name: &str| {
+            let channel = stored.iter().find(|channel| channel.0 == name);
+            channel.unwrap_or_else(|| panic!("{name} in {stored:?}")).1.clone()
+        };
+        assert_eq!((stored.len(), of("id.I")), (12, vec![70_000.0, 0.0]));
+        assert!((of("normal.Y")[0] - 0.6).abs() < 1e-3 && (of("normal.Z")[0] + 0.8).abs() < 1e-3);
+        assert!((of("albedo.R")[0] - 0.214_041).abs() < 1e-3 && of("albedo.G")[0] == 1.0);
+        let short = Layers { identifiers: Some(vec![1]), ..Layers::default() };
+        assert!(picture.encode_with(&encoding, &short).is_err());
     }
 }

@@ -86,7 +86,7 @@ impl Scene {
     }
 
     /// Returns the scene with those items that are kept, by number.
-    pub(super) fn filtered(&self, is_kept: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn filtered(&self, is_kept: impl Fn(usize) -> bool) -> Self {
         let numbers: Vec<usize> = (0..self.items.len()).filter(|number| is_kept(*number)).collect();
         Self {
             items: numbers.iter().map(|number| self.items[*number].clone()).collect(),

@@ -83,7 +83,8 @@ impl Appearance {
     pub fn of_volume(&self, name: &str, volume: &Volume) -> Result<TransferFunction> {
         let mut values = Values::new(name, volume.range, volume.bounds());
         values.are_labels = volume.is_label_map();
-        self.transfer(&values, || TransferFunction::automatic(volume))
+        let automatic = || TransferFunction::automatic(volume);
+        self.transfer(&values, automatic, || volume.foreground())
     }
 
     /// Returns the transfer function of scattered samples.
@@ -92,7 +93,7 @@ impl Appearance {
     /// Those of [`of_volume`](Self::of_volume).
     pub fn of_samples(&self, name: &str, points: &Points) -> Result<TransferFunction> {
         let values = Values::new(name, points.range(), points.bounds());
-        self.transfer(&values, || points.automatic_transfer())
+        self.transfer(&values, || points.automatic_transfer(), || values.range)
     }
 
     /// Returns the transfer function of cells.
@@ -103,7 +104,8 @@ impl Appearance {
         let values = Values::new(name, cells.range(), cells.bounds());
         // A surface without light has no shape; a haze with light has no colours.
         let shade = (!self.isosurfaces.is_empty()).then(Shade::default);
-        self.transfer(&values, || TransferFunction { shade, ..cells.automatic_transfer() })
+        let automatic = || TransferFunction { shade, ..cells.automatic_transfer() };
+        self.transfer(&values, automatic, || values.range)
     }
 
     /// Returns the transfer function of a volume in bricks. The automatic one is that of a level
@@ -115,13 +117,15 @@ impl Appearance {
         let overview = overview_of(bricks)?;
         let header = bricks.header();
         let values = Values::new(name, header.range, header.lattice.bounds());
-        self.transfer(&values, || TransferFunction::automatic(&overview))
+        let automatic = || TransferFunction::automatic(&overview);
+        self.transfer(&values, automatic, || overview.foreground())
     }
 
     fn transfer(
         &self,
         &Values { name, range: values, diagonal, are_labels }: &Values<'_>,
         automatic: impl Fn() -> TransferFunction,
+        foreground: impl Fn() -> [f64; 2],
     ) -> Result<TransferFunction> {
         let transfer = match &self.transfer {
             None if values[0] >= values[1] && self.isosurfaces.is_empty() => {
@@ -134,7 +138,9 @@ impl Appearance {
             None if are_labels => automatic(),
             None => for_optics(automatic(), self.optics, (values, diagonal)),
             Some(Transfer::Named(preset)) => {
-                let mut named = TransferFunction::named(preset, values)?.for_size(diagonal);
+                let is_of_foreground = TransferFunction::is_of_foreground(preset);
+                let spread = if is_of_foreground { foreground() } else { values };
+                let mut named = TransferFunction::named(preset, spread)?.for_size(diagonal);
                 // Light fades where the gradient is noise, whatever the colours are.
                 let certain = automatic().shade.and_then(|shade| shade.certain);
                 named.shade = named.shade.map(|shade| Shade { certain, ..shade });

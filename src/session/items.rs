@@ -522,6 +522,9 @@ impl Adding<'_> {
 
     fn add_volume(&mut self, volume: Volume) -> Result<()> {
         let Self { name, showing, .. } = *self;
+        if volume.opacities.is_some() {
+            return self.add_colors_of_two(volume);
+        }
         if volume.colors.is_some() {
             match &showing.values_by {
                 None => return self.add_colors(&volume),
@@ -536,6 +539,18 @@ impl Adding<'_> {
         }
         let transfer = showing.appearance.of_volume(&name.text, &volume)?;
         self.add_field(volume, transfer)
+    }
+
+    /// Adds a volume in the colours of its values, as opaque as another array says.
+    fn add_colors_of_two(&mut self, mut volume: Volume) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        let Some(opacities) = volume.opacities.take() else { return self.add_volume(volume) };
+        let colored = showing.appearance.color_by_two(name, &mut volume, &opacities)?;
+        if let Some(transfer) = colored {
+            let title = Legend::title(&volume.about.name, &volume.about.unit);
+            self.values(&transfer, volume.range, title, volume.about.labels.as_ref());
+        }
+        self.add_colors(&volume)
     }
 
     /// Adds the channels of a volume that were read, each in a colour.

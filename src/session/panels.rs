@@ -49,6 +49,12 @@ impl Panel {
         Self { at: [0, 0], size }
     }
 
+    /// Returns the number of panels in a row that nobody sets: up to four, else about as many as
+    /// there are rows.
+    pub fn usual_columns(count: u32) -> u32 {
+        if count <= 4 { count } else { f64::from(count).sqrt().ceil() as u32 }
+    }
+
     /// Returns `count` panels of one size in rows of `columns`, from the left and the top, with
     /// what is left over around them.
     ///

@@ -3,6 +3,7 @@
 use super::Data;
 use crate::{
     Error, Result,
+    about::Modality,
     bricks::Bricks,
     formats::{
         self, Array, Content, FORMATS, Format, Kind, RawLayout, ReadOptions, Series, Times,
@@ -10,6 +11,7 @@ use crate::{
     },
     hierarchy::Hierarchy,
     input::{Limits, Source},
+    volume::Volume,
 };
 use std::{
     path::{Path, PathBuf},
@@ -23,6 +25,10 @@ pub struct Reading {
     /// from the [table](Self::with_label_table), if there is one.
     pub options: ReadOptions,
     label_table: Option<PathBuf>,
+    /// What measured the values of volumes, whatever their files say.
+    modality: Option<Modality>,
+    /// The array that says how opaque a volume is.
+    opacity_from: Option<String>,
     limits: Limits,
     /// The limits of an input that is read as a whole.
     whole: Limits,
@@ -50,7 +56,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Data> {
 impl Reading {
     /// Creates the way to read inputs within these limits.
     pub fn new(options: ReadOptions, limits: Limits) -> Self {
-        Self { options, label_table: None, whole: limits.clone(), limits }
+        Self { options, whole: limits.clone(), limits, ..Self::default() }
     }
 
     /// Lets an input that is read as a whole take no more than these bytes of memory. Hierarchies
@@ -66,6 +72,20 @@ impl Reading {
     /// Takes names and colours of labels from this file ([`formats::read_labels`]).
     pub fn with_label_table(mut self, file: Option<PathBuf>) -> Self {
         self.label_table = file;
+        self
+    }
+
+    /// Takes this as what measured the values of volumes, whatever their files say.
+    pub fn with_modality(mut self, modality: Option<Modality>) -> Self {
+        self.modality = modality;
+        self
+    }
+
+    /// Also reads the values that say how opaque volumes are, from an array of the same file by
+    /// the name that chooses it: of [`ReadOptions::dataset`] for HDF5, NPZ and Zarr, else of
+    /// [`ReadOptions::scalar`].
+    pub fn with_opacity_from(mut self, array: Option<String>) -> Self {
+        self.opacity_from = array;
         self
     }
 
@@ -212,6 +232,16 @@ impl Opened<'_> {
         &self.reading.limits
     }
 
+    /// Returns what to read of it.
+    pub(super) fn options(&self) -> &ReadOptions {
+        &self.reading.options
+    }
+
+    /// Returns where it is read from; `None` for files of hierarchies and bricks.
+    pub(super) fn source(&self) -> Option<&Source<'_>> {
+        self.source.as_ref()
+    }
+
     /// Returns its path, or the address of a remote object.
     pub fn path(&self) -> &Path {
         self.path
@@ -236,7 +266,10 @@ impl Opened<'_> {
                 if let Some(table) = label_table {
                     options.labels = formats::read_labels(table, limits)?;
                 }
-                Data::Volume(formats::read_volume(source, &options)?)
+                let mut volume = formats::read_volume(source, &options)?;
+                volume.about.modality = self.reading.modality.or(volume.about.modality);
+                volume.opacities = self.opacities(source)?.map(Arc::new);
+                Data::Volume(volume)
             }
             (Kind::Samples, Some(source)) => Data::Samples(formats::read_samples(source, options)?),
             (Kind::Cells, Some(source)) => {
@@ -250,6 +283,21 @@ impl Opened<'_> {
         };
         data.warn_of_holes(&self.path.display().to_string());
         Ok(data)
+    }
+
+    /// Reads the values that say how opaque a volume is, if an array of them is named.
+    fn opacities(&self, source: &Source) -> Result<Option<Volume>> {
+        let Some(array) = &self.reading.opacity_from else { return Ok(None) };
+        let mut options = self.reading.options.clone();
+        let by_data_set = Format::of_path(self.path).is_some_and(|format| {
+            ["HDF", "NPZ", "Zarr"].iter().any(|word| format.name.contains(word))
+        });
+        match by_data_set {
+            true => (options.dataset, options.scalar) = (Some(array.clone()), None),
+            false => options.scalar = Some(array.clone()),
+        }
+        options.channels = None;
+        formats::read_volume(source, &options).map(Some)
     }
 
     /// Opens a hierarchy.

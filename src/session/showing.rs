@@ -1,6 +1,6 @@
 //! How an input is shown.
 
-use super::{Appearance, Coloring};
+use super::{Appearance, Coloring, Glyphs};
 use crate::{
     Deadline, Error, Result,
     cells::{SolidOptions, Tint},
@@ -37,6 +37,11 @@ pub struct Showing {
     pub point_radius: Option<String>,
     /// The width of lines.
     pub line_width: Option<Size>,
+    /// The glyphs of an array, which are drawn instead of the input
+    /// ([`Opened::glyphs`](super::Opened::glyphs)).
+    pub glyphs: Option<Glyphs>,
+    /// A factor on their size.
+    pub glyph_scale: Option<f64>,
     /// Whether the edges of triangles are drawn.
     pub draws_edges: bool,
     /// How cells are drawn; by default as a solid, unless another option shows the field inside.
@@ -64,6 +69,8 @@ impl Default for Showing {
             point_size: None,
             point_radius: None,
             line_width: None,
+            glyphs: None,
+            glyph_scale: None,
             draws_edges: false,
             cells: None,
             is_named: false,

@@ -93,6 +93,7 @@ fn volumes_are_refused_where_they_come_in() {
             coefficients: None,
             colors: None,
             more_channels: Vec::new(),
+            opacities: None,
             about: About::default(),
         };
         refused_by_all(&format!("{:?}", volume.lattice), word, &volume);

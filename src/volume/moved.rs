@@ -46,6 +46,7 @@ impl Volume {
             coefficients,
             colors: self.colors.clone(),
             more_channels: Vec::new(),
+            opacities: self.opacities.clone(),
             about,
         }
     }

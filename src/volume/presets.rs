@@ -35,12 +35,29 @@ const CT_ANGIOGRAPHY: Points = &[
     [600.0, 0.98, 0.85, 0.70, 0.4],
     [1200.0, 1.0, 0.98, 0.93, 0.7],
 ];
-/// Values as fractions of the range.
+/// Values as fractions of the range. Opacity rises early and colours have one hue, so that a coil
+/// that is more sensitive on one side changes the lightness alone.
 const MRI: Points = &[
-    [0.08, 0.20, 0.18, 0.22, 0.0],
-    [0.25, 0.55, 0.42, 0.38, 0.04],
-    [0.50, 0.80, 0.68, 0.58, 0.2],
-    [1.00, 1.00, 0.97, 0.92, 0.6],
+    [0.00, 0.46, 0.36, 0.33, 0.0],
+    [0.10, 0.55, 0.43, 0.39, 0.1],
+    [0.25, 0.68, 0.55, 0.48, 0.5],
+    [0.60, 0.86, 0.76, 0.68, 0.7],
+    [1.00, 1.00, 0.97, 0.92, 0.8],
+];
+/// Grey and white matter; fluid and fat are clear.
+const MR_BRAIN: Points = &[
+    [0.28, 0.62, 0.38, 0.35, 0.0],
+    [0.42, 0.80, 0.58, 0.52, 0.35],
+    [0.65, 0.93, 0.84, 0.76, 0.7],
+    [0.85, 1.0, 0.97, 0.90, 0.7],
+    [1.00, 1.0, 0.99, 0.96, 0.04],
+];
+/// Blood that flows into the slices is brighter than all else.
+const MR_ANGIOGRAPHY: Points = &[
+    [0.62, 0.45, 0.05, 0.05, 0.0],
+    [0.75, 0.75, 0.14, 0.10, 0.12],
+    [0.90, 0.95, 0.42, 0.24, 0.6],
+    [1.00, 1.0, 0.88, 0.76, 0.8],
 ];
 const GENERIC: Points = &[
     [0.10, 0.20, 0.05, 0.10, 0.0],
@@ -54,10 +71,24 @@ const HEAD: f64 = 350.0;
 
 impl TransferFunction {
     /// The names that [`named`](Self::named) accepts.
-    pub const NAMES: [&'static str; 6] =
-        ["ct-bone", "ct-soft-tissue", "ct-lung", "ct-angiography", "mri", "generic"];
+    pub const NAMES: [&'static str; 8] = [
+        "ct-bone",
+        "ct-soft-tissue",
+        "ct-lung",
+        "ct-angiography",
+        "mri",
+        "mr-brain",
+        "mr-angiography",
+        "generic",
+    ];
 
-    /// Returns a preset. The CT presets expect Hounsfield units. "mri" and "generic" spread over
+    /// Whether a preset is for magnetic resonance, whose values have no unit: it is spread over the
+    /// values that stand out of the background ([`Volume::foreground`](super::Volume::foreground)).
+    pub fn is_of_foreground(name: &str) -> bool {
+        matches!(name, "mri" | "mr-brain" | "mr-angiography")
+    }
+
+    /// Returns a preset. The CT presets expect Hounsfield units. The others spread over
     /// `range`. Opacities hold for a world length of 1, as for a scan of a body in millimetres;
     /// [`for_size`](Self::for_size) fits them to other data.
     ///
@@ -77,6 +108,8 @@ impl TransferFunction {
             "ct-lung" => (CT_LUNG, 0.0, 1.0),
             "ct-angiography" => (CT_ANGIOGRAPHY, 0.0, 1.0),
             "mri" => (MRI, low, high - low),
+            "mr-brain" => (MR_BRAIN, low, high - low),
+            "mr-angiography" => (MR_ANGIOGRAPHY, low, high - low),
             "generic" => (GENERIC, low, high - low),
             _ => {
                 let names = Self::NAMES.join(", ");

@@ -236,6 +236,8 @@ pub struct Volume {
     ///
     /// [`ReadOptions::channels`]: crate::formats::ReadOptions::channels
     pub more_channels: Vec<Self>,
+    /// The values of another array on the same lattice that say how opaque the samples are.
+    pub opacities: Option<Arc<Self>>,
     /// What the file says beyond the values.
     pub about: About,
 }
@@ -291,6 +293,7 @@ impl Volume {
             coefficients: None,
             colors: None,
             more_channels: Vec::new(),
+            opacities: None,
             about: About::default(),
         })
     }

@@ -144,6 +144,7 @@ impl Volume {
         let drawn = Self {
             colors: None,
             more_channels: Vec::new(),
+            opacities: None,
             samples: Samples::F32(prefilter::cubic(&self.samples, self.lattice.dims)),
             range: self.range,
             lattice: self.lattice.clone(),

@@ -14,6 +14,7 @@ mod hosts;
 mod images;
 mod items;
 mod labels;
+mod layers;
 mod lights;
 mod near;
 mod occlusion;

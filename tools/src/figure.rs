@@ -31,8 +31,14 @@ pub struct FigureFlags {
         conflicts_with_all = ["view", "camera", "view_of", "camera_position", "turntable", "path"]
     )]
     views: Vec<Side>,
-    /// Set the number of views in a row [default: all of up to four, else about a square], or of
-    /// --times in one picture
+    /// Show each channel in a panel of its own, and all of them in the last one.
+    #[arg(
+        long,
+        conflicts_with_all = ["views", "turntable", "path", "times", "depth"]
+    )]
+    split_channels: bool,
+    /// Set the number of views or channels in a row [default: all of up to four, else about a
+    /// square], or of --times in one picture
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
     columns: Option<u32>,
     /// Choose what the corner of each view says [default: names]
@@ -52,6 +58,16 @@ enum Labels {
 }
 
 impl FigureFlags {
+    /// Whether each channel has a panel.
+    pub fn splits_channels(&self) -> bool {
+        self.split_channels
+    }
+
+    /// Returns the number of panels in a row, if it is given, and what the corner of each says.
+    pub fn row_of_channels(&self) -> (Option<u32>, PanelLabels) {
+        (self.columns, self.panel_labels.map(PanelLabels::from).unwrap_or_default())
+    }
+
     /// Returns the number of times in a row, and what the corner of each says. `None` if times
     /// become frames.
     pub fn row_of_times(&self) -> Option<(u32, PanelLabels)> {

@@ -4,7 +4,7 @@ use crate::{
     failure::Failure,
     output::{self, Target},
 };
-use splatkit::picture::{Encoding, Picture, PictureFormat};
+use splatkit::picture::{Encoding, Layers, Picture, PictureFormat};
 use splatkit_media::video::{Encoder, Film, Format};
 use std::path::{Path, PathBuf};
 
@@ -81,11 +81,14 @@ impl Frames {
         Ok(Writer { background, how, way })
     }
 
-    /// Refuses bits that a picture file of this kind cannot have.
-    pub fn check(&self, how: Storing) -> Result<(), Failure> {
+    /// Refuses bits that a picture file of this kind cannot have, and layers if it has none.
+    pub fn check(&self, how: Storing, has_layers: bool) -> Result<(), Failure> {
         match self {
             Self::Pictures(targets) => {
-                targets.iter().take(1).try_for_each(|it| how.of(it.format(), None).check())?;
+                for encoding in targets.iter().take(1).map(|it| how.of(it.format(), None)) {
+                    encoding.check()?;
+                    encoding.check_layers(has_layers)?;
+                }
             }
             Self::Film(..) | Self::Raw if how.bits.is_some() => {
                 let message = "--bits is for pictures: films and raw frames have 8 bits a channel";
@@ -129,11 +132,16 @@ enum Way<'a> {
 impl Writer<'_> {
     /// Writes the next frame. Returns whether more frames are wanted.
     pub fn add(&mut self, picture: &Picture) -> Result<bool, Failure> {
+        self.add_with(picture, &Layers::default())
+    }
+
+    /// Writes the next frame with layers. Returns whether more frames are wanted.
+    pub fn add_with(&mut self, picture: &Picture, layers: &Layers) -> Result<bool, Failure> {
         match &mut self.way {
             Way::Pictures(targets) => {
                 let Some(target) = targets.next() else { return Ok(false) };
                 let encoding = self.how.of(target.format(), self.background);
-                target.write(&picture.encode(&encoding)?)?;
+                target.write(&picture.encode_with(&encoding, layers)?)?;
                 Ok(true)
             }
             Way::Film(encoder) => Ok(encoder.add(&picture.to_rgba8(self.background))?),

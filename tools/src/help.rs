@@ -129,19 +129,19 @@ mod tests {
         (
             "Input",
             "dims type spacing endian header scalar time series dataset missing radius neighbours \
-            no-slopes labels scale rotate translate",
+            no-slopes labels modality opacity-from scale rotate translate",
         ),
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (
             "Appearance",
             "transfer range channels opacity-unit iso gradient-opacity radius-scale points \
-            point-size point-radius line-width cells crease edges opacity colormap color nan-color \
-            log-colors",
+            point-size point-radius line-width glyphs glyph-scale cells crease edges opacity \
+            colormap color nan-color log-colors",
         ),
         ("Kernel", "kernel sigma extent sharp"),
         ("Page", "title viewer"),
         ("Animation", "turntable path times fps"),
-        ("Figures", "width height dpi views columns panel-labels"),
+        ("Figures", "width height dpi views split-channels columns panel-labels"),
         ("Texts", "scalar-bar axes scale-bar caption"),
         (
             "Camera",

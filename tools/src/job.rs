@@ -303,15 +303,16 @@ impl Job {
         Figure::new(&self.scene.picture, overlay, (&self.framing()?, subject))
     }
 
-    /// Returns the panels of a picture of several times.
-    pub fn figure_of_times(
+    /// Returns the panels of a picture that shows several times or channels by one camera: their
+    /// names, the number in a row and what their corners say.
+    pub fn figure_of(
         &self,
         subject: &Subject,
         finish: &Finish,
-        times: (&[usize], (u32, PanelLabels)),
+        panels: (Vec<String>, Option<u32>, PanelLabels),
     ) -> splatkit::Result<Figure> {
         let overlay = finish.overlay.as_ref();
-        Figure::of_times(&self.scene.picture, overlay, (&self.framing()?, subject), times)
+        Figure::of_panels(&self.scene.picture, overlay, (&self.framing()?, subject), panels)
     }
 
     /// Returns how a picture with several panels is finished, if each has such a label.

@@ -1,10 +1,14 @@
 //! The flags that say how inputs are read.
 
 use crate::{failure::Failure, limits::LimitFlags, parse};
-use clap::Args;
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use glam::DVec3;
 use splatkit::{
     Deadline,
+    about::Modality,
     formats::{Endian, Kind, SampleType},
     input::Limits,
     session::{Data, Description, LimitsEntry, Reading, ReadingEntry},
@@ -56,6 +60,14 @@ pub struct LoadFlags {
     /// Take samples of this value as holes, as samples that are not numbers are.
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     missing: Option<f64>,
+    /// Volumes: say what measured the values, for the first colours: ct, mr, emission, ultrasound
+    /// or microscopy [default: as the file says]
+    #[arg(long, value_name = "NAME", value_parser = modalities())]
+    modality: Option<Modality>,
+    /// Volumes: take the opacity from this array of the file, and the colours from the values
+    /// (--scalar, --colormap).
+    #[arg(long, value_name = "NAME")]
+    opacity_from: Option<String>,
     /// Label maps: take names and colours of labels from this table, of ITK-SNAP, FreeSurfer, 3D
     /// Slicer or with columns index, name, color.
     #[arg(long, value_name = "FILE", value_parser = parse::input())]
@@ -76,6 +88,12 @@ pub struct LoadFlags {
     /// When everything that is read must be done.
     #[arg(skip)]
     until: Deadline,
+}
+
+/// Parses what measured the values of a volume.
+fn modalities() -> impl TypedValueParser<Value = Modality> {
+    PossibleValuesParser::new(Modality::ALL.map(Modality::name))
+        .map(|name| Modality::named(&name).expect("a name of the list"))
 }
 
 impl LoadFlags {
@@ -127,6 +145,8 @@ impl LoadFlags {
             dataset: self.dataset.clone(),
             spacing: self.spacing.map(|spacing| spacing.to_array()),
             missing: self.missing,
+            modality: self.modality,
+            opacity_from: self.opacity_from.clone(),
             labels: self.labels.clone(),
             radius: self.radius,
             neighbours: self.neighbours,
@@ -148,8 +168,22 @@ impl LoadFlags {
             )*};
         }
         share!(
-            scalar, dims, r#type, endian, header, time, series, dataset, spacing, missing, labels,
-            radius, neighbours, slopes
+            scalar,
+            dims,
+            r#type,
+            endian,
+            header,
+            time,
+            series,
+            dataset,
+            spacing,
+            missing,
+            modality,
+            opacity_from,
+            labels,
+            radius,
+            neighbours,
+            slopes
         );
         let LimitsEntry { points, bytes, depth, texels, seconds } = entry.limits;
         let limits = &mut scene.reading.limits;

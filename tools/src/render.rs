@@ -1,5 +1,7 @@
 //! `splatkit render`.
 
+mod layers;
+mod panels;
 mod times;
 
 use crate::{
@@ -18,7 +20,10 @@ use crate::{
     scene::SceneFlags,
     timing::milliseconds,
 };
-use clap::Args;
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use splatkit::{
     Error, FrameStats, Renderer,
     about::direction_name,
@@ -27,8 +32,8 @@ use splatkit::{
     math::Camera,
     picture::{Picture, PictureFormat},
     reference,
-    scene::Settings,
-    session::{Background, Description, Origin, Samples},
+    scene::{Scene, Settings},
+    session::{Background, Description, Layer, Origin, Samples},
 };
 #[cfg(feature = "window")]
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
@@ -63,6 +68,16 @@ struct OutputFlags {
     /// nothing.
     #[arg(long, value_name = "FILE.png", conflicts_with_all = ["turntable", "path", "times"])]
     depth: Option<PathBuf>,
+    /// Also write these layers into the .exr file, with commas between them: normals, albedo,
+    /// identifiers.
+    #[arg(
+        long,
+        value_name = "LAYERS",
+        value_delimiter = ',',
+        value_parser = layers(),
+        conflicts_with_all = ["turntable", "path", "times", "views", "split_channels", "raw"]
+    )]
+    layers: Vec<Layer>,
     /// Replace existing files.
     #[arg(long)]
     overwrite: bool,
@@ -101,6 +116,13 @@ pub struct Render {
     reference: bool,
 }
 
+/// Parses a layer of a picture.
+fn layers() -> impl TypedValueParser<Value = Layer> {
+    PossibleValuesParser::new(Layer::ALL.map(Layer::name)).map(|name| {
+        Layer::ALL.into_iter().find(|layer| layer.name() == name).expect("a name of the list")
+    })
+}
+
 /// The renderer of the pictures.
 pub enum Drawer {
     Engine(Box<Renderer>),
@@ -120,6 +142,23 @@ impl Drawer {
         match self {
             Self::Engine(renderer) => renderer.device().name(),
             Self::Reference => "reference",
+        }
+    }
+
+    /// Draws another scene, or a part of the loaded one, by itself.
+    fn draw_scene(
+        &self,
+        scene: &Scene,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> splatkit::Result<(Picture, FrameStats)> {
+        match self {
+            Self::Engine(renderer) => {
+                Renderer::new(&renderer.device().clone(), scene)?.render(camera, settings)
+            }
+            Self::Reference => {
+                Ok((reference::render(scene, camera, settings)?, FrameStats::default()))
+            }
         }
     }
 
@@ -218,8 +257,8 @@ impl Render {
         self.engine.apply(scene);
         self.overlay.apply(scene);
         self.figure.apply(scene, self.engine.has_size());
-        if self.motion.times().is_some() {
-            // They are for the times, not for views.
+        if self.motion.times().is_some() || self.figure.splits_channels() {
+            // They are for the times or the channels, not for views.
             (scene.picture.columns, scene.picture.panel_labels) = (None, None);
         }
         scene.picture.background = self.background.or(scene.picture.background);
@@ -268,6 +307,9 @@ impl Render {
         let begun = Instant::now();
         if let Some(times) = self.motion.times() {
             return self.draw_times(times, job, (begun, progress));
+        }
+        if self.figure.splits_channels() {
+            return self.draw_channels(job, (begun, progress));
         }
         let inputs = job.inputs();
         let output = self.output.output.clone();
@@ -496,9 +538,10 @@ impl Run<'_> {
                 Err(failure) => return Err(failure),
             }
             let mut picture = finish.reduced(picture, &camera, loaded)?;
+            let layers = self.draw_layers(&camera, drawer)?;
             tell("Writing", frame);
             texts = finish.overlaid(&mut picture, &camera);
-            let is_wanted = writer.add(&picture)?;
+            let is_wanted = writer.add_with(&picture, &layers)?;
             self.write_depth(&picture)?;
             missing = missing.max(stats.missing_pages);
             last = (stats, camera);
@@ -620,7 +663,7 @@ impl OutputFlags {
         (inputs, progress): (&[PathBuf], &Progress),
     ) -> Result<Frames, Failure> {
         let frames = self.unchecked_frames(output, motion, film)?;
-        frames.check(Storing { bits: self.bits, dpi: None })?;
+        frames.check(Storing { bits: self.bits, dpi: None }, !self.layers.is_empty())?;
         if let Frames::Film(path, format) = &frames {
             format.check(path, film)?;
             if let Some(warning) = format.loss(film) {

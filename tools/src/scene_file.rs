@@ -22,6 +22,8 @@ pub const NOT_OF_PICTURES: &[&str] = &[
     "output",
     "bits",
     "depth",
+    "layers",
+    "split-channels",
     "overwrite",
     "json",
     "turntable",

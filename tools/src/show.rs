@@ -13,7 +13,7 @@ use clap::{
 };
 use splatkit::{
     facet::Size,
-    session::{CellStyle, ChannelEntry, Description, IsosurfaceEntry, TransferEntry},
+    session::{CellStyle, ChannelEntry, Description, Glyphs, IsosurfaceEntry, TransferEntry},
     surface::PointStyle,
     volume::TransferFunction,
 };
@@ -24,9 +24,9 @@ use std::path::PathBuf;
 #[command(next_help_heading = "Appearance")]
 pub struct ShowFlags {
     /// Choose how the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung,
-    /// ct-angiography, mri, generic, a JSON file, or its text. FILE=NAME is for one input, and the
-    /// flag can be given several times [default: made for the values, as `splatkit transfer` writes
-    /// it]
+    /// ct-angiography, mri, mr-brain, mr-angiography, generic, a JSON file, or its text. FILE=NAME is
+    /// for one input, and the flag can be given several times [default: made for the values, as
+    /// `splatkit transfer` writes it]
     #[arg(long, value_name = "[FILE=]NAME|FILE.json", value_parser = transfer)]
     transfer: Vec<InputValue<String>>,
     /// Spread the transfer function over these values instead of its own, and the colour map of
@@ -86,6 +86,14 @@ pub struct ShowFlags {
     /// 3px]
     #[arg(long, value_name = "WIDTH")]
     line_width: Option<Size>,
+    /// Draw an arrow for each vector, or an ellipsoid for each tensor, of an array of points,
+    /// instead of the input: arrows or ellipsoids, with :ARRAY, or with :VX,VY,VZ for three arrays
+    /// of numbers [default: the first array with as many components]
+    #[arg(long, value_name = "SHAPE[:ARRAY]")]
+    glyphs: Option<Glyphs>,
+    /// Scale glyphs. At 1, the longest arrow is half as long again as glyphs are apart.
+    #[arg(long, value_name = "FACTOR", value_parser = parse::positive)]
+    glyph_scale: Option<f64>,
     /// Meshes: split the normals where two triangles meet at more than this angle, so that the
     /// crease looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees
     /// [default: 60]
@@ -151,6 +159,8 @@ impl ShowFlags {
         Shared::set(scene, |appearance| &mut appearance.point_size, self.point_size);
         Shared::set(scene, |appearance| &mut appearance.point_radius, self.point_radius.clone());
         Shared::set(scene, |appearance| &mut appearance.line_width, self.line_width);
+        Shared::set(scene, |appearance| &mut appearance.glyphs, self.glyphs.clone());
+        Shared::set(scene, |appearance| &mut appearance.glyph_scale, self.glyph_scale);
         Shared::set(scene, |appearance| &mut appearance.crease, self.crease);
         Shared::set(scene, |appearance| &mut appearance.cells, self.cells);
         scene.appearance.edges |= self.edges;

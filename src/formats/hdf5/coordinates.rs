@@ -217,6 +217,7 @@ impl<'a> Coordinates<'a> {
     }
 
     /// Places the samples of a volume, whose axes x, y and z are these dimensions of the data set.
+    /// Returns whether the file has coordinates.
     ///
     /// Axes whose unit differs from that of x have the mean step of x: degrees and metres have no
     /// common scale.
@@ -225,17 +226,17 @@ impl<'a> Coordinates<'a> {
         source: &Source,
         file: &File,
         volume: &mut Volume,
-        dimensions: [usize; 3],
+        dimensions: [Option<usize>; 3],
         options: &ReadOptions,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let mut places = [const { None }; 3];
         for (places, dimension) in places.iter_mut().zip(dimensions) {
-            if let Some(scale) = &self.scales[dimension] {
+            if let Some(scale) = dimension.and_then(|at| self.scales[at].as_ref()) {
                 *places = scale.places(source, file)?;
             }
         }
         if places.iter().all(Option::is_none) {
-            return Ok(());
+            return Ok(false);
         }
         let units = places.each_ref().map(|axis| axis.as_ref().map_or("", |axis| &axis.unit));
         let factors = factors(&places);
@@ -253,7 +254,7 @@ impl<'a> Coordinates<'a> {
         if factors == [Some(1.0); 3] || meters(units[0]).is_some() {
             volume.about.length = units[0].into();
         }
-        Ok(())
+        Ok(true)
     }
 }
 

@@ -99,7 +99,7 @@ fn a_fourth_dimension_may_be_time() {
     file.create_dataset("v").with_u8_data(&data).with_shape(&[2, 2, 2, 5]);
     let bytes = file.finish().unwrap();
     let at = |time| load(&bytes, &ReadOptions { time, ..ReadOptions::default() });
-    assert!(at(None).unwrap_err().to_string().contains("has no numbers of three dimensions"));
+    assert!(at(None).unwrap_err().to_string().contains("has neither numbers of three dimensions"));
     let second = ReadOptions { time: Some(1), ..named("v") };
     let volume = load(&bytes, &second).unwrap();
     assert_eq!((volume.lattice.dims, volume.range), ([5, 2, 2], [20.0, 39.0]));
@@ -116,6 +116,37 @@ fn meshes_of_solvers_are_no_volumes() {
         let Error::Input { hint, .. } = of(name).unwrap_err() else { panic!("{name}") };
         assert!(hint.unwrap().contains("python -m pysplatkit render"), "{name}");
     }
+}
+
+#[test]
+fn without_volumes_the_largest_picture_is_read() {
+    let file = |with_scales: bool| {
+        let mut file = FileBuilder::new();
+        let data: Vec<f32> = (0..16 * 20).map(|v| v as f32).collect();
+        file.create_dataset("small").with_u8_data(&[0; 256]).with_shape(&[16, 16]);
+        let picture = file.create_dataset("picture").with_f32_data(&data).with_shape(&[16, 20]);
+        if with_scales {
+            picture.set_attr("DIMENSION_LIST", AttrValue::I64(0));
+            let north: Vec<f64> = (0..16).map(|at| 60.0 - f64::from(at)).collect();
+            let east: Vec<f64> = (0..20).map(f64::from).collect();
+            for (name, values) in [("lat", north), ("lon", east)] {
+                let count = values.len() as u64;
+                file.create_dataset(name)
+                    .with_f64_data(&values)
+                    .with_shape(&[count])
+                    .set_attr("CLASS", AttrValue::String("DIMENSION_SCALE".into()))
+                    .set_attr("NAME", AttrValue::String(name.into()))
+                    .set_attr("units", AttrValue::String("degrees".into()));
+            }
+        }
+        load(&file.finish().unwrap(), &ReadOptions::default()).unwrap()
+    };
+    let plain = file(false);
+    assert_eq!((plain.lattice.dims, plain.range), ([20, 16, 1], [0.0, 319.0]));
+    assert_eq!(plain.about.orientation, Some(Orientation::Y_DOWN));
+    let placed = file(true);
+    assert_eq!(placed.about.orientation, Some(Orientation::Y_UP));
+    assert_eq!(placed.lattice.position(DVec3::Y), DVec3::new(0.0, 59.0, 0.0));
 }
 
 /// A data set of two times with scales along its four dimensions, of which three have one length.

@@ -46,6 +46,8 @@ pub struct Header {
     /// Three rows of the matrix.
     pub matrix: [[f64; 4]; 3],
     pub name: String,
+    /// What wrote the file says of it.
+    pub description: String,
 }
 
 /// Returns the version of the header that bytes begin with, as an index of `SIZES`, and its byte
@@ -190,6 +192,7 @@ impl Fields<'_> {
             offset: std::array::from_fn(floats(268)),
             matrix: std::array::from_fn(|row| std::array::from_fn(floats(280 + 16 * row))),
             name: if is_analyze { String::new() } else { self.text(328, 16) },
+            description: self.text(148, 80),
         }
     }
 
@@ -215,6 +218,7 @@ impl Fields<'_> {
             offset: std::array::from_fn(doubles(376)),
             matrix: std::array::from_fn(|row| std::array::from_fn(doubles(400 + 32 * row))),
             name: self.text(508, 16),
+            description: self.text(240, 80),
         }
     }
 }

@@ -155,15 +155,20 @@ impl Shaped {
         axes
     }
 
-    /// Returns the axes of x, y and z; `None` if there are none.
+    /// Returns the axes of x, y and z; `None` if there are none. A picture has no z.
     #[cfg(feature = "hdf5")]
-    pub fn space(&self) -> Option<[usize; 3]> {
-        match self.counted_axes()[..] {
+    pub fn space(&self) -> Option<[Option<usize>; 3]> {
+        let axes = self.counted_axes();
+        if let ([y, x] | [y, x, _], true) = (&axes[..], self.is_picture()) {
+            return Some([Some(*x), Some(*y), None]);
+        }
+        let space = match axes[..] {
             [z, y, x] => Some([x, y, z]),
             [_, z, y, x] if self.outer.is_some() => Some([x, y, z]),
             [z, y, x, _] | [_, z, y, x, _] => Some([x, y, z]),
             _ => None,
-        }
+        };
+        space.map(|axes| axes.map(Some))
     }
 
     /// Whether it is a picture: two axes, or colours of bytes along a third. Arrays of fewer

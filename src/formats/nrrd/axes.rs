@@ -1,6 +1,6 @@
 //! Which axes of a file are those of space, and what a fourth one is.
 
-use super::{Header, excerpt};
+use super::Header;
 use crate::{
     Result,
     formats::{
@@ -41,8 +41,8 @@ impl Axes {
             4 => header.numbers::<4, _>("sizes", sizes)?.to_vec(),
             _ => {
                 let message = format!(
-                    "is {dimension}, but a volume has 3 axes, and a fourth one of colours, \
-                     components or times"
+                    "is {dimension}, but a volume has 2 or 3 axes of space, and one more of \
+                     colours, components or times"
                 );
                 return Err(header.source.error("dimension", message));
             }
@@ -54,10 +54,7 @@ impl Axes {
             .map(str::to_ascii_lowercase)
             .collect();
         if dimension == 3 {
-            return match kinds.iter().find(|kind| is_several(kind)) {
-                Some(kind) => Err(flat(header, kind)),
-                None => Ok(Self { sizes, other: None }),
-            };
+            return Ok(Self { sizes, other: None });
         }
         let is_space = |kind: &str| matches!(kind, "domain" | "space");
         // A kind that is known comes first, then an axis without a direction.
@@ -165,20 +162,8 @@ impl Axes {
 }
 
 /// Returns whether an axis of a kind has several numbers of one sample.
-fn is_several(kind: &str) -> bool {
+pub(super) fn is_several(kind: &str) -> bool {
     ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"]
         .iter()
         .any(|name| kind.contains(name))
-}
-
-/// Returns the error for a picture, whose axes are two of space and one of a kind.
-fn flat(header: &Header, kind: &str) -> crate::Error {
-    let message = format!(
-        "one of the 3 axes holds values of the kind “{}”, but a volume has 3 axes of space",
-        excerpt(kind)
-    );
-    header
-        .source
-        .error("kinds", message)
-        .hint("pictures are drawn of PNG, JPEG, TIFF and NPY files; name a volume")
 }

@@ -10,7 +10,7 @@ use crate::{
     math::Kernel,
     scene::Optics,
     session::{
-        Appearance, CellStyle, ChannelStyle, Coloring, Showing, Surface, SurfaceColor,
+        Appearance, CellStyle, ChannelStyle, Coloring, Glyphs, Showing, Surface, SurfaceColor,
         SurfaceValue, Transfer as Chosen,
     },
     surface::{PointStyle, SurfelOptions},
@@ -88,6 +88,14 @@ pub struct AppearanceEntry {
     /// The width of lines: a number in world units, or a text such as `3px`, which is the default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_width: Option<Size>,
+    /// Glyphs of an array of points instead of the input: `arrows` of vectors or `ellipsoids` of
+    /// tensors, with the array's name after a colon.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub glyphs: Option<Glyphs>,
+    /// A factor on the size of glyphs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub glyph_scale: Option<f64>,
     /// The angle between triangles, in degrees, from which on a crease looks sharp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crease: Option<f32>,
@@ -249,7 +257,7 @@ impl AppearanceEntry {
         own_or_shared!(
             transfer, range, channels, opacity_unit, isosurfaces, gradient_opacity, colormap,
             nan_color, kernel, sigma, extent, color, opacity, radius_scale, points, point_size,
-            point_radius, line_width, crease, cells;
+            point_radius, line_width, glyphs, glyph_scale, crease, cells;
             log_colors, sharp, edges
         )
     }
@@ -277,6 +285,9 @@ impl AppearanceEntry {
         }
         if !self.extent.iter().all(is_length) {
             return Err(("extent", "must be a length above 0".into()));
+        }
+        if !self.glyph_scale.iter().all(is_length) {
+            return Err(("glyph_scale", "must be a number above 0".into()));
         }
         if self.opacity.is_some_and(|opacity| !(opacity > 0.0 && opacity <= 1.0)) {
             return Err(("opacity", "must be above 0 and at most 1".into()));
@@ -380,6 +391,8 @@ impl AppearanceEntry {
             point_size: self.point_size,
             point_radius: self.point_radius.clone(),
             line_width: self.line_width,
+            glyphs: self.glyphs.clone(),
+            glyph_scale: self.glyph_scale,
             draws_edges: self.edges,
             cells: self.cells,
             values_by: self.shows_values().map(str::to_owned),

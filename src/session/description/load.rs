@@ -3,10 +3,11 @@
 use super::{Description, InputEntry, PictureEntry, TransferEntry};
 use crate::{
     Error, Result,
+    about::About,
     formats::{Kind, Times},
     math::Camera,
     memory,
-    scene::{Scene, Settings},
+    scene::{Item, Scene, Settings},
     session::{
         Captions, CellStyle, Data, Drawing, Facts, Framing, Items, Name, Showing, Subject, Surfaces,
     },
@@ -230,6 +231,10 @@ impl Description {
             Some(files) => reading.open_held(path, bytes_of(files, path)?, attribute)?,
         };
         let mut data = opened.read()?;
+        if let Some(glyphs) = &showing.glyphs {
+            let scale = showing.glyph_scale.unwrap_or(1.0);
+            data = Data::Mesh(opened.glyphs(&data, glyphs, scale)?);
+        }
         opened.give_radii(&mut data, showing.point_radius.as_deref())?;
         input.transform.apply(path, &mut data)?;
         let (is_raw, files, facts) = (opened.is_raw(), opened.files(), opened.cheap_facts(&data)?);
@@ -250,6 +255,34 @@ impl Loaded {
     /// Returns the number of splats, facets, samples and cells.
     pub fn count(&self) -> u64 {
         self.items.count()
+    }
+
+    /// Returns each channel that is drawn, by its name, with the scene as it is without the other
+    /// channels of its file; none if no input is drawn in several channels.
+    pub fn channels(&self) -> Vec<(String, Scene)> {
+        let is_of_channels = |input: &&LoadedInput| {
+            self.channel(input.items.start).is_some() && input.items.len() > 1
+        };
+        let inputs = self.inputs.iter().filter(is_of_channels);
+        let alone = |of: &LoadedInput, channel: usize| {
+            self.scene.filtered(|item| item == channel || !of.items.contains(&item))
+        };
+        let named = |of: &LoadedInput, channel: usize| {
+            let name = self.channel(channel).map_or("", |about| about.name.as_str());
+            let name = if name.is_empty() { format!("channel {channel}") } else { name.to_owned() };
+            (name, alone(of, channel))
+        };
+        inputs.flat_map(|input| input.items.clone().map(move |at| named(input, at))).collect()
+    }
+
+    /// Returns what is known of an item that is a channel.
+    fn channel(&self, item: usize) -> Option<&About> {
+        let about = match self.scene.items.get(item)? {
+            Item::Volume(volume, ..) => &volume.about,
+            Item::Bricks(bricks, ..) => bricks.about(),
+            _ => return None,
+        };
+        (about.channels.len() > 1).then_some(about)
     }
 
     /// Finds the points that span what is seen with these settings, if the camera is fitted to

@@ -302,7 +302,7 @@ impl PictureEntry {
     /// Returns the number of panels in a row and in a column.
     fn cells(&self) -> [u32; 2] {
         let count = self.views.len().max(1) as u32;
-        let usual = if count <= 4 { count } else { f64::from(count).sqrt().ceil() as u32 };
+        let usual = Panel::usual_columns(count);
         let columns = self.columns.unwrap_or(usual).clamp(1, count);
         [columns, count.div_ceil(columns)]
     }

@@ -2,6 +2,7 @@
 
 use crate::{
     Deadline, Error, Result,
+    about::Modality,
     formats::{Endian, RawLayout, ReadOptions, SampleType},
     input::Limits,
     memory,
@@ -48,6 +49,12 @@ pub struct ReadingEntry {
     /// A value that stands for “no value”.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<f64>,
+    /// Volumes: what measured the values, whatever the file says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modality: Option<Modality>,
+    /// Volumes: the array that says how opaque the samples are; the values give the colours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub opacity_from: Option<String>,
     /// Label maps: a table with names and colours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub labels: Option<PathBuf>,
@@ -130,8 +137,22 @@ impl ReadingEntry {
             };
         }
         own_or_shared!(
-            scalar, dims, r#type, endian, header, time, series, dataset, spacing, missing, labels,
-            radius, neighbours, slopes
+            scalar,
+            dims,
+            r#type,
+            endian,
+            header,
+            time,
+            series,
+            dataset,
+            spacing,
+            missing,
+            modality,
+            opacity_from,
+            labels,
+            radius,
+            neighbours,
+            slopes
         )
     }
 
@@ -188,6 +209,8 @@ impl ReadingEntry {
         Reading::new(self.options(), self.limits())
             .within_memory(memory.filter(|_| self.limits.bytes.is_none()))
             .with_label_table(self.labels.clone())
+            .with_modality(self.modality)
+            .with_opacity_from(self.opacity_from.clone())
     }
 
     /// Returns what to read of a file.

@@ -3,11 +3,12 @@
 
 type Rgb = [f64; 3];
 
-/// Materials: from thin air to what is inside.
+/// Materials: from thin air to what is inside. Warm, because scans of bodies often do not say that
+/// they are some.
 pub const MATERIALS: [Rgb; 4] =
-    [[0.33, 0.60, 0.70], [0.64, 0.70, 0.56], [0.93, 0.70, 0.38], [0.98, 0.94, 0.86]];
+    [[0.62, 0.34, 0.27], [0.80, 0.54, 0.38], [0.93, 0.76, 0.52], [0.98, 0.94, 0.86]];
 /// Solids of many values.
-pub const SOLID: [Rgb; 3] = [[0.24, 0.55, 0.66], [0.62, 0.76, 0.74], [0.99, 0.94, 0.82]];
+pub const SOLID: [Rgb; 3] = [[0.58, 0.33, 0.27], [0.86, 0.64, 0.47], [0.99, 0.94, 0.82]];
 /// Values below a background that has values on both sides.
 pub const BELOW: [Rgb; 2] = [[0.22, 0.40, 0.78], [0.62, 0.86, 1.0]];
 /// Values above it.

@@ -100,6 +100,21 @@ impl TransferFunction {
     }
 }
 
+impl Volume {
+    /// Returns the values that stand out of the background, without outliers: from its end to the
+    /// value that one in two hundred of the samples above it exceed. A background that varies, and
+    /// a few bright samples, change it little. The whole range if nothing is above the background.
+    pub fn foreground(&self) -> [f64; 2] {
+        if self.validate().is_err() || self.range[0] >= self.range[1] {
+            return self.range;
+        }
+        let survey = Survey::of_volume(self, window(&self.about, self.range));
+        let side = Side::new(&survey, &Materials::of(&survey), true);
+        let [low, high] = [side.start(), side.quantile(0.995)];
+        if side.mass() > 0.0 && low < high { [low, high] } else { self.range }
+    }
+}
+
 /// Returns the part of a range that a file's window shows; `None` without a window, or if it has
 /// next to nothing of the range. Hounsfield units mean the same in every window.
 fn window(about: &About, [low, high]: [f64; 2]) -> Option<[f64; 2]> {

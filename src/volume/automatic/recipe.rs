@@ -101,6 +101,11 @@ impl<'a> Side<'a> {
         self.counts.iter().map(|(_, count)| count).sum()
     }
 
+    /// Returns the value at which the background ends.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
     /// Distance of the last value from the background's most frequent one.
     pub fn reach(&self) -> f64 {
         let last = self.counts.iter().rev().find(|(_, count)| *count > 0.0);
@@ -118,7 +123,7 @@ impl<'a> Side<'a> {
     }
 
     /// Returns the value below which a share of the samples of this side lies.
-    fn quantile(&self, share: f64) -> f64 {
+    pub fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.mass();
         let mut seen = 0.0;
         let entry = self.counts.iter().find(|(_, count)| {

@@ -200,6 +200,32 @@ fn hounsfield_units_show_skin_and_bone() {
     assert_eq!(transfer.shade, None, "what emits light is not lit");
 }
 
+/// A coil that is more sensitive on one side, noise as magnitudes have it, and a few bright samples
+/// change the values that stand out little.
+#[test]
+fn what_stands_out_is_robust() {
+    let body = nested([0.0, 500.0, 500.0], 0.0);
+    let magnitude = |bias: f64| {
+        let body = &body;
+        volume(move |at: DVec3| {
+            let signal = body(at) * (1.0 + bias * at.x) + 15.0 * noise(at);
+            signal.hypot(15.0 * noise(at + 7.0))
+        })
+    };
+    let [low, high] = magnitude(0.0).foreground();
+    assert!((40.0..250.0).contains(&low) && (480.0..600.0).contains(&high), "{low} {high}");
+    let mut bright = magnitude(0.0);
+    if let Samples::I16(values) = &mut bright.samples {
+        values[SIDE * SIDE * SIDE / 2] = 20_000;
+    }
+    bright.range[1] = 20_000.0;
+    assert!(bright.foreground()[1] < 700.0, "{:?}", bright.foreground());
+    let biased = magnitude(0.4).foreground();
+    assert!((40.0..250.0).contains(&biased[0]) && biased[1] < 800.0, "{biased:?}");
+    let flat = volume(|_| 3.0);
+    assert_eq!(flat.foreground(), [3.0; 2]);
+}
+
 #[test]
 fn a_window_limits_the_values() {
     let mut windowed = floats(|at| 1000.0 * (1.0 - at.length()).max(0.0).powi(2) + noise(at));

@@ -44,24 +44,25 @@ impl Figure {
         Ok(Some(Self::named((size, labels), panels, names, cameras)))
     }
 
-    /// Returns the figure that shows a scene at several times, all by one camera, with this number
-    /// of them in a row.
+    /// Returns the figure whose panels, such as times or channels, are all seen by one camera.
+    /// Without a number of `columns`, up to four are in a row, and more in about a square.
     ///
     /// # Errors
     /// Those of [`Panel::grid`] and [`Framing::camera`].
-    pub fn of_times(
+    pub fn of_panels(
         picture: &PictureEntry,
         overlay: Option<&Overlay>,
         (framing, subject): (&Framing, &Subject),
-        (times, (columns, labels)): (&[usize], (u32, PanelLabels)),
+        (names, columns, labels): (Vec<String>, Option<u32>, PanelLabels),
     ) -> Result<Self> {
         let size = picture.size();
         let free = overlay.map_or(Panel::whole(size), |overlay| overlay.free(size));
-        let count = times.len() as u32;
+        let count = names.len() as u32;
+        let columns = columns.unwrap_or_else(|| Panel::usual_columns(count));
         let panels = free.grid(count, columns)?;
         let camera = framing.camera(subject, panels[0].size)?;
-        let names = times.iter().map(|time| format!("time {time}")).collect();
-        Ok(Self::named((size, labels), panels, names, vec![camera; times.len()]))
+        let cameras = vec![camera; names.len()];
+        Ok(Self::named((size, labels), panels, names, cameras))
     }
 
     fn named(

@@ -13,11 +13,11 @@ use splatkit::{
     glam::DVec3,
     interaction::{Effort, Histogram},
     math::{Bounds, Camera},
-    picture::Picture,
-    scene::{Clip, Item, Region, Scene},
+    picture::{Layers, Picture},
+    scene::{Clip, Item, Region, Scene, Settings},
     session::{
-        Coloring, Data, Drawing, Engine, Framing, Items, Mark, Name, OverlayEntry, PanelLabels,
-        PictureEntry, Showing, Subject,
+        Coloring, Data, Drawing, Engine, Framing, Items, Layer, Mark, Name, OverlayEntry,
+        PanelLabels, PictureEntry, Showing, Subject,
     },
     volume::TransferFunction,
 };
@@ -384,6 +384,39 @@ impl Stage {
             }
         }
         Ok(Drawn { picture, stats, camera })
+    }
+
+    /// Draws layers of the picture that a camera takes.
+    pub fn layers(
+        &self,
+        text: &str,
+        draw: &Draw,
+        wanted: &[Layer],
+        stop: &Stop,
+    ) -> Result<Layers, Error> {
+        if !draw.picture.views.is_empty() || draw.keep_samples || draw.region.is_some() {
+            return Err(wrong("layers are of a picture of one view"));
+        }
+        let mut kept = self.take(draw.draws_facets())?;
+        let drawing = draw.drawing(&kept, stop)?;
+        let camera = camera(text)?;
+        let marks = locked(&self.items).marks.clone();
+        let ends = marks.iter().skip(1).map(|(_, first)| *first);
+        let ends = ends.chain([kept.scene.items.len()]);
+        let inputs: Vec<_> = marks.iter().zip(ends).map(|((_, first), end)| *first..end).collect();
+        let (scene, device) = (kept.scene.clone(), draw.device()?);
+        let mut renderer = kept.renderer_of(draw)?;
+        let mut render = |part: Option<&Scene>, settings: &Settings| {
+            let drawn = match part {
+                Some(part) => Renderer::new(&device, part)?.render(&camera, settings),
+                None => renderer.render(&camera, settings),
+            };
+            drawn.map(|(picture, _)| picture)
+        };
+        let layers = drawing.layers(wanted, &camera, (&scene, &inputs), &mut render);
+        kept.renderer = Some((draw.engine, renderer));
+        self.put(kept, draw.draws_facets());
+        layers
     }
 
     /// Draws a picture of several views. The statistics are those of the last.

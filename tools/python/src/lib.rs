@@ -100,6 +100,7 @@ fn _pysplatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("COLOR_MAPS", ColorMap::NAMES.to_vec())?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<picture::Picture>()?;
+    module.add_class::<picture::Layers>()?;
     module.add_class::<film::Film>()?;
     module.add_class::<hierarchy::Hierarchy>()?;
     module.add_function(wrap_pyfunction!(color, module)?)?;

@@ -11,7 +11,7 @@ use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyBytes};
 use splatkit::{
     Error, Stop, disk,
-    picture::{Encoding, Picture as Pixels, PictureFormat},
+    picture::{Encoding, Layers as Known, Picture as Pixels, PictureFormat},
 };
 use std::{path::PathBuf, sync::Arc};
 
@@ -22,6 +22,52 @@ pub struct Picture {
     /// The statistics as JSON.
     statistics: String,
     camera: String,
+}
+
+/// What is known of the pixels of a picture beside their colours and depths.
+#[pyclass(frozen, module = "pysplatkit._pysplatkit")]
+pub struct Layers(Arc<Known>);
+
+impl From<Known> for Layers {
+    fn from(layers: Known) -> Self {
+        Self(Arc::new(layers))
+    }
+}
+
+#[pymethods]
+impl Layers {
+    /// Layers of rows of pixels.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        normals: Option<Bound<'_, PyAny>>,
+        albedo: Option<Bound<'_, PyAny>>,
+        identifiers: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let made = (|| {
+            Ok(Known {
+                normals: normals.as_ref().map(rows::<f32, 3>).transpose()?,
+                albedo: albedo.as_ref().map(rows::<f32, 4>).transpose()?,
+                identifiers: identifiers.as_ref().map(numbers::<u32>).transpose()?,
+            })
+        })();
+        made.map(Self::from).map_err(|error: Error| raise(py, &error))
+    }
+
+    /// Normals, row by row.
+    fn normals<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {
+        self.0.normals.as_ref().map(|all| PyArray1::from_slice(py, all.as_flattened()))
+    }
+
+    /// Colours without light that are multiplied by their opacity, row by row.
+    fn albedo<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {
+        self.0.albedo.as_ref().map(|all| PyArray1::from_slice(py, all.as_flattened()))
+    }
+
+    /// Numbers of inputs, row by row.
+    fn identifiers<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<u32>>> {
+        self.0.identifiers.as_ref().map(|all| PyArray1::from_slice(py, all))
+    }
 }
 
 impl From<Drawn> for Picture {
@@ -125,7 +171,7 @@ impl Picture {
         Ok(PyBytes::new(py, &encoded))
     }
 
-    /// Writes a picture file with these bits a channel and pixels an inch.
+    /// Writes a picture file with these bits a channel, pixels an inch and layers.
     fn save(
         &self,
         py: Python<'_>,
@@ -133,12 +179,17 @@ impl Picture {
         background: Option<[f32; 3]>,
         bits: Option<u32>,
         dpi: Option<f64>,
+        layers: Option<PyRef<'_, Layers>>,
     ) -> PyResult<()> {
         let pixels = self.pixels.clone();
+        let layers = layers.map(|layers| layers.0.clone()).unwrap_or_default();
         run(py, &Stop::default(), move || {
             let mut encoding = Encoding::new(PictureFormat::of(&path)?);
             (encoding.background, encoding.bits, encoding.dpi) = (background, bits, dpi);
-            pixels.save_as(path, &encoding)
+            let is_stored = encoding.format == PictureFormat::OpenExr;
+            let none = Known::default();
+            let layers = if is_stored { &*layers } else { &none };
+            disk::write(&path, &pixels.encode_with(&encoding, layers)?)
         })
     }
 

@@ -7,7 +7,7 @@ use crate::{
     draw::{Added, Draw, Stage, Viewpoint},
     errors::{options, raise, wrong},
     parts::{appearance, reading},
-    picture::Picture,
+    picture::{Layers, Picture},
     worker::run,
 };
 use numpy::PyArray1;
@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop,
-    about::{About, Frame, Label, Modality, Orientation},
+    about::{About, Channel, Frame, Label, Modality, Orientation},
     formats,
     gaussians::{Gaussians, harmonics},
     glam::{DMat3, DVec3, Quat, Vec3},
@@ -24,7 +24,7 @@ use splatkit::{
     scattered::Points,
     scene::Optics,
     session::{
-        AppearanceEntry, CameraEntry, Data, Description, Engine, Framing, InputEntry, Name,
+        AppearanceEntry, CameraEntry, Data, Description, Engine, Framing, InputEntry, Layer, Name,
         OverlayEntry, PictureEntry, ReadingEntry, TransformEntry,
     },
     surface::Mesh,
@@ -61,6 +61,8 @@ struct ArrayFacts {
     /// The frame of a patient, `lps` or `ras`.
     frame: Option<String>,
     labels: Option<ArrayLabels>,
+    /// The names of the channels, if there are several.
+    channel_names: Option<Vec<String>>,
     /// Where the item is moved to.
     transform: TransformEntry,
 }
@@ -112,19 +114,14 @@ impl ArrayFacts {
         about.name.clone_from(&self.value_name);
         about.unit.clone_from(&self.value_unit);
         about.length.clone_from(&self.unit);
-        about.modality = match self.modality.as_deref() {
-            None => None,
-            Some("ct") => Some(Modality::Ct),
-            Some("mr") => Some(Modality::Mr),
-            Some("emission") => Some(Modality::Emission),
-            Some("ultrasound") => Some(Modality::Ultrasound),
-            Some("microscopy") => Some(Modality::Microscopy),
-            Some(other) => {
-                return Err(wrong(format!(
-                    "the modality “{other}” is none of ct, mr, emission, ultrasound and microscopy"
-                )));
-            }
-        };
+        if let Some(name) = self.modality.as_deref() {
+            let known = Modality::ALL.into_iter().find(|modality| modality.name() == name);
+            about.modality = Some(known.ok_or_else(|| {
+                wrong(format!(
+                    "the modality “{name}” is none of ct, mr, emission, ultrasound and microscopy"
+                ))
+            })?);
+        }
         about.orientation = match self.frame.as_deref() {
             Some("lps" | "ras") => Some(Orientation::RAS),
             _ => None,
@@ -138,6 +135,13 @@ impl ArrayFacts {
             about.orientation = Some(Orientation::with_up(up));
         }
         Ok(about)
+    }
+
+    /// Returns the channels of an array that has this many.
+    fn channels(&self, count: usize) -> Vec<Channel> {
+        let names = self.channel_names.as_deref().unwrap_or_default();
+        let name = |number: usize| names.get(number).cloned().unwrap_or_default();
+        (0..count).map(|number| Channel { name: name(number), ..Channel::default() }).collect()
     }
 
     fn lattice(&self, dims: [usize; 3]) -> Lattice {
@@ -352,6 +356,43 @@ impl Scene {
     }
 }
 
+/// Channels are quantities.
+fn no_labels(volume: &Volume) -> Option<&'static ArrayLabels> {
+    (volume.about.channels.len() > 1).then_some(&ArrayLabels::Are(false))
+}
+
+/// Returns the numbers of the channels of an array to draw: those that are named, all, or the first
+/// one.
+fn channels_read(
+    facts: &ArrayFacts,
+    count: usize,
+    named: Option<&[String]>,
+) -> Result<Vec<usize>, Error> {
+    let Some(named) = named else { return Ok(vec![0]) };
+    if count > Channel::MOST && named.is_empty() {
+        let most = Channel::MOST;
+        return Err(wrong(format!(
+            "the array has {count} channels, but a picture shows at most {most}; channels= chooses \
+             some"
+        )));
+    }
+    let all = facts.channels(count);
+    let number = |name: &String| {
+        let by_number = name.parse().ok().filter(|number| *number < count);
+        let is_it = |channel: &Channel| channel.name.eq_ignore_ascii_case(name);
+        by_number.or_else(|| all.iter().position(is_it)).ok_or_else(|| {
+            let names: Vec<String> =
+                (0..count).map(|number| Channel::name_of(&all, number)).collect();
+            wrong(format!("there is no channel “{name}”; there are {}", names.join(", ")))
+        })
+    };
+    match named {
+        [] => Ok((0..count).collect()),
+        _ if count == 1 => Ok(vec![0]),
+        named => named.iter().map(number).collect(),
+    }
+}
+
 /// Reads the options of an array.
 fn array_options(
     facts: &str,
@@ -402,26 +443,45 @@ impl Scene {
         Self(Arc::new(self.0.forked(count)))
     }
 
-    /// Adds the samples of an array.
+    /// Adds the samples of an array for each channel, and those that say how opaque they are.
     fn add_volume(
         &self,
         py: Python<'_>,
-        array: Bound<'_, PyAny>,
+        channels: Vec<Bound<'_, PyAny>>,
+        opacity: Option<Bound<'_, PyAny>>,
         facts: &str,
         load: &str,
         appearance: &str,
     ) -> PyResult<()> {
         let (facts, more) =
             array_options(facts, load, appearance).map_err(|error| raise(py, &error))?;
-        let made = samples(&array).and_then(|(dims, samples)| Ok((dims, samples, facts.about()?)));
-        let (dims, samples, about) = made.map_err(|error| raise(py, &error))?;
-        let (lattice, missing) = (facts.lattice(dims), facts.missing);
+        let read = channels_read(&facts, channels.len(), more.1.channels_read().as_deref());
+        let made = read.and_then(|read| {
+            let parts = read.iter().map(|number| samples(&channels[*number]));
+            let parts = parts.collect::<Result<Vec<_>, _>>()?;
+            Ok((read, parts, opacity.as_ref().map(samples).transpose()?, facts.about()?))
+        });
+        let (read, parts, opacity, about) = made.map_err(|error| raise(py, &error))?;
+        let (lattice, missing) = (facts.lattice(parts[0].0), facts.missing);
         let labels = facts.labels.clone();
+        let names = facts.channels(channels.len());
         let measured = move || {
-            let mut volume = Volume::with_missing(lattice, samples, missing)?;
-            let holes = std::mem::replace(&mut volume.about, about).holes;
-            volume.about.holes = holes;
-            ArrayLabels::apply(labels.as_ref(), volume)
+            let plain = |samples| Volume::with_missing(lattice.clone(), samples, missing);
+            let mut volumes = read.into_iter().zip(parts).map(|(number, (_, samples))| {
+                let mut volume = plain(samples)?;
+                let holes = std::mem::replace(&mut volume.about, about.clone()).holes;
+                volume.about.holes = holes;
+                if names.len() > 1 {
+                    volume.about.name.clone_from(&names[number].name);
+                    (volume.about.channels, volume.about.channel) = (names.clone(), number);
+                }
+                Ok::<_, Error>(volume)
+            });
+            let first = volumes.next().expect("a volume has at least one channel")?;
+            let mut volume = Volume { more_channels: volumes.collect::<Result<_, _>>()?, ..first };
+            volume.opacities =
+                opacity.map(|(_, samples)| plain(samples)).transpose()?.map(Arc::new);
+            ArrayLabels::apply(labels.as_ref().or(no_labels(&volume)), volume)
         };
         let volume: Volume = run(py, &Stop::default(), measured)?;
         self.add(py, Data::Volume(volume), facts, more)
@@ -534,6 +594,28 @@ impl Scene {
         run(py, &Stop::default(), move || {
             Ok(stage.turntable(&fit, &draw, frames)?.iter().map(to_json).collect())
         })
+    }
+
+    /// Draws layers of the picture that a camera takes.
+    fn layers(
+        &self,
+        py: Python<'_>,
+        camera: String,
+        draw: &str,
+        wanted: Vec<String>,
+    ) -> PyResult<Layers> {
+        let layer = |name: &String| {
+            let known = Layer::ALL.into_iter().find(|layer| layer.name() == name);
+            let names = Layer::ALL.map(Layer::name).join(", ");
+            known.ok_or_else(|| wrong(format!("there is no layer “{name}”; there are {names}")))
+        };
+        let wanted = wanted.iter().map(layer).collect::<Result<Vec<_>, _>>();
+        let parsed = wanted.and_then(|wanted| Ok((wanted, Draw::parse(draw)?)));
+        let (wanted, draw) = parsed.map_err(|error| raise(py, &error))?;
+        let (stage, stop) = (self.0.clone(), Stop::default());
+        let worker_stop = stop.clone();
+        let layers = run(py, &stop, move || stage.layers(&camera, &draw, &wanted, &worker_stop))?;
+        Ok(layers.into())
     }
 
     /// Draws a picture by a camera, or else by one that is fitted to the scene.

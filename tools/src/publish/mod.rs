@@ -26,8 +26,9 @@ use std::{
 use viewer::Viewer;
 
 /// Flags of `render` that are not for pages, which have their own sizes and one view.
-const NOT_OF_PAGES: [&str; 16] = [
+const NOT_OF_PAGES: [&str; 18] = [
     "depth",
+    "layers",
     "turntable",
     "path",
     "times",
@@ -36,6 +37,7 @@ const NOT_OF_PAGES: [&str; 16] = [
     "reference",
     "bits",
     "views",
+    "split-channels",
     "columns",
     "panel-labels",
     "size",
@@ -51,6 +53,7 @@ const NOT_OF_PAGES: [&str; 16] = [
     mut_arg("output", |flag| flag.required(true).help(OUTPUT).long_help(OUTPUT)),
     mut_arg("json", |flag| flag.help("Print what was written to stdout, as JSON.")),
     mut_arg("depth", |flag| flag.hide(true)),
+    mut_arg("layers", |flag| flag.hide(true)),
     mut_arg("turntable", |flag| flag.hide(true)),
     mut_arg("path", |flag| flag.hide(true)),
     mut_arg("times", |flag| flag.hide(true)),
@@ -59,6 +62,7 @@ const NOT_OF_PAGES: [&str; 16] = [
     mut_arg("reference", |flag| flag.hide(true)),
     mut_arg("bits", |flag| flag.hide(true)),
     mut_arg("views", |flag| flag.hide(true)),
+    mut_arg("split_channels", |flag| flag.hide(true)),
     mut_arg("columns", |flag| flag.hide(true)),
     mut_arg("panel_labels", |flag| flag.hide(true)),
     mut_arg("size", |flag| flag.hide(true)),

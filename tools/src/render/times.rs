@@ -142,7 +142,8 @@ impl Run<'_> {
         let Ready { job, loaded, finish, .. } = self.ready;
         let storing = Storing { bits: self.output.bits, dpi: finish.dpi };
         let mut writer = self.frames.open(self.film, storing)?;
-        let figure = job.figure_of_times(&loaded.subject, finish, (times, row))?;
+        let names = times.iter().map(|time| format!("time {time}")).collect();
+        let figure = job.figure_of(&loaded.subject, finish, (names, Some(row.0), row.1))?;
         let size = figure.panel_size();
         let mut numbers = times.iter().copied().enumerate();
         let mut stats = FrameStats::default();

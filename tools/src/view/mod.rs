@@ -44,9 +44,11 @@ use window::{Surroundings, Window};
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
 /// Flags of `render` that say what is written.
-const OF_FILES: [&str; 10] = [
+const OF_FILES: [&str; 12] = [
     "output",
     "depth",
+    "layers",
+    "split-channels",
     "overwrite",
     "turntable",
     "path",
@@ -63,6 +65,8 @@ const OF_FILES: [&str; 10] = [
     mut_arg("inputs", |inputs| inputs.required(false)),
     mut_arg("output", |flag| flag.hide(true)),
     mut_arg("depth", |flag| flag.hide(true)),
+    mut_arg("layers", |flag| flag.hide(true)),
+    mut_arg("split_channels", |flag| flag.hide(true)),
     mut_arg("overwrite", |flag| flag.hide(true)),
     mut_arg("turntable", |flag| flag.hide(true)),
     mut_arg("path", |flag| flag.hide(true)),

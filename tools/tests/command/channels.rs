@@ -128,3 +128,28 @@ fn pictures_are_drawn_as_they_are() {
     assert!(fs::metadata(folder.path("p_2.png")).is_ok());
     assert_eq!(fs::read(folder.path("p.png")).unwrap(), bytes);
 }
+
+#[test]
+fn each_channel_has_a_panel() {
+    let folder = Folder::new();
+    folder.put("a.ome.tif", channels());
+    folder.put("b.nrrd", nrrd("uint8", &ball()));
+    let flags = "--engine cpu --panel-labels none --size 192x64 --samples 1";
+    folder.run(&format!("render a.ome.tif -o a.png --split-channels {flags}")).ok();
+    let (width, pixels) = pixels(&folder, "a.png");
+    let sums: Vec<[u64; 3]> = (0..3)
+        .map(|panel| {
+            let inside = |at: usize| (panel * 64..(panel + 1) * 64).contains(&(at % width));
+            let of = pixels.iter().enumerate().filter(|(at, _)| inside(*at));
+            of.fold([0; 3], |sum, (_, pixel)| {
+                [0, 1, 2].map(|part| sum[part] + u64::from(pixel[part]))
+            })
+        })
+        .collect();
+    let [blue, green, both] = sums[..] else { panic!("three panels") };
+    assert!(blue[2] > 3 * blue[1] && green[1] > 3 * green[2], "{sums:?}");
+    assert!(both[2] * 2 > blue[2] && both[1] * 2 > green[1], "{sums:?}");
+    folder
+        .run("render b.nrrd -o b.png --split-channels")
+        .fails(2, &["--split-channels", "several"]);
+}

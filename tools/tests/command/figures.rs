@@ -81,3 +81,17 @@ fn pictures_have_many_formats() {
         .fails(2, &["a .exr file has 16 or 32 bits a channel, not 8"]);
     folder.run("render a.obj -o a.gif --turntable 3 --bits 16").fails(2, &["--bits"]);
 }
+
+#[test]
+fn openexr_files_have_layers() {
+    let folder = folder();
+    let all = "--layers normals,albedo,identifiers";
+    folder.run(&format!("render a.nrrd a.obj -o a.exr --size 40x30 --engine cpu {all}")).ok();
+    let bytes = fs::read(folder.path("a.exr")).unwrap();
+    let has = |name: &str| bytes.windows(name.len()).any(|part| part == name.as_bytes());
+    assert!(["normal.X", "albedo.G", "id.I"].into_iter().all(has));
+    folder.run(&format!("render a.obj -o a.png {all}")).fails(2, &["layers", ".exr"]);
+    folder
+        .run(&format!("render a.nrrd -o b.exr --size 40x30 --mip --engine cpu {all}"))
+        .fails(2, &["lights other than"]);
+}

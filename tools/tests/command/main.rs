@@ -13,6 +13,7 @@ mod files;
 #[cfg(unix)]
 mod gaussian_oracle;
 mod gaussians;
+mod glyphs;
 mod help;
 #[cfg(unix)]
 mod hostile;

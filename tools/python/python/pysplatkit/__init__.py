@@ -107,7 +107,8 @@ def render(
     rest: dict[str, Any] = dict(options)
     # `up` is the way up of an array, and otherwise that of the camera.
     is_file = isinstance(source, (str, os.PathLike))
-    names = (_options.DRAWING | _options.PAGE | _options.VIEW) - (set() if is_file else {"up"})
+    names = _options.DRAWING | _options.PAGE | _options.VIEW | {"layers"}
+    names -= set() if is_file else {"up"}
     given |= {name: rest.pop(name) for name in names & rest.keys()}
     # The `meta.json` of trained Gaussians (SOG), and the index of streamed ones, is no scene.
     if is_file:

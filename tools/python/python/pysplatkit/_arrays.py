@@ -39,17 +39,22 @@ def numbers(value: Any, name: str) -> npt.NDArray[Any]:
     return array.astype(array.dtype.newbyteorder("="), copy=False)
 
 
-def samples(value: Any, copy: bool | None = None) -> npt.NDArray[Any]:
-    """Returns the samples of a volume, [z, y, x], in one of the library's types.
+def samples(value: Any, copy: bool | None = None, axes: int = 3) -> npt.NDArray[Any]:
+    """Returns the samples of a volume, [z, y, x], in one of the library's types; with four axes,
+    those of its channels, one after the other.
 
     They are copied if `copy` is True, and if it is None where the library needs another type or
     layout.
     """
     array = numbers(value, "the volume")
-    if array.ndim != 3 or array.size == 0:
+    if axes == 4 and (array.ndim != 4 or array.size == 0):
+        raise ArgumentError(
+            f"a volume with a channel_axis has four axes with samples, not the shape {array.shape}"
+        )
+    if array.ndim != axes or array.size == 0:
         hint = ""
         if array.ndim == 4:
-            hint = "; choose one time or component, such as array[0] or array[..., 0]"
+            hint = "; channel_axis=0 draws all channels, and array[0] or array[..., 0] one"
         raise ArgumentError(
             f"a volume has three axes (z, y, x) with samples, not the shape {array.shape}{hint}"
         )

@@ -143,7 +143,9 @@ def _plain_volume(given: Arguments) -> Arguments:
     for name in ("spacing", "origin", "axes", "coordinates", "value_name", "value_unit", "unit"):
         facts[name] = getattr(volume, name) if facts[name] is None else facts[name]
     facts["frame"] = facts["frame"] or volume.frame
-    samples = _arrays.samples(volume.samples, copy)
+    samples = _samples(volume.samples, given, copy)
+    facts["opacity_from"] = _opacity(array, given.pop("opacity_from", None), samples)
+    facts["channel_names"] = _channel_names(given.pop("channel_names", None), samples)
     if facts["axes"] is not None:
         matrix = _arrays.rows(facts["axes"], 3, "axes", "f8")
         if matrix.shape != (3, 3):
@@ -151,11 +153,49 @@ def _plain_volume(given: Arguments) -> Arguments:
         facts["axes"] = matrix.tolist()
     for name in ("spacing", "origin"):
         facts[name] = _values.vector(facts[name])
-    facts["coordinates"] = _coordinates(facts["coordinates"], samples.shape)
+    facts["coordinates"] = _coordinates(facts["coordinates"], samples.shape[-3:])
     facts["up"] = _options.direction(facts["up"])
     facts["labels"] = _labels(facts["labels"])
     appearance = _options.checked(given, _options.VOLUME, "add_volume")
+    axis = 0 if samples.ndim == 4 else None
+    facts["channel_axis"] = axis
     return {"array": samples, **facts, **_options.plain_appearance(appearance)}
+
+
+def _samples(array: Any, given: Arguments, copy: bool | None) -> Any:
+    """Returns the samples of a volume, with its channels along the first of four axes."""
+    axis = given.pop("channel_axis", None)
+    if axis is None:
+        return _arrays.samples(array, copy)
+    whole = np.asarray(array)
+    if not (isinstance(axis, int) and -whole.ndim <= axis < whole.ndim):
+        raise ArgumentError(f"channel_axis={axis!r} is no axis of the shape {whole.shape}")
+    return _arrays.samples(np.moveaxis(whole, axis, 0), copy, axes=4)
+
+
+def _opacity(source: Any, opacity: Any, samples: Any) -> Any:
+    """Returns the samples that say how opaque a volume is."""
+    if opacity is None:
+        return None
+    if isinstance(opacity, str):
+        volume = _neighbours.of_kind(_neighbours.Volume, source, opacity, "add_volume")
+        opacity = volume.samples
+    array = _arrays.samples(opacity)
+    if array.shape != samples.shape:
+        raise ArgumentError(
+            f"opacity_from has the shape {array.shape}, and the values {samples.shape}"
+        )
+    return array
+
+
+def _channel_names(names: Any, samples: Any) -> list[str] | None:
+    if names is None:
+        return None
+    listed = [str(name) for name in names]
+    if samples.ndim != 4 or len(listed) != len(samples):
+        count = len(samples) if samples.ndim == 4 else 0
+        raise ArgumentError(f"there are {len(listed)} channel_names for {count} channels")
+    return listed
 
 
 _VOLUME = (
@@ -166,8 +206,11 @@ _VOLUME = (
 
 def _put_volume(native: _pysplatkit.Scene, item: Item) -> None:
     arguments = item.arguments
-    facts, appearance = item.facts(*_VOLUME), _options.appearance(arguments)
-    native.add_volume(arguments["array"], facts, "{}", appearance)
+    facts = item.facts(*_VOLUME, "channel_names")
+    appearance = _options.appearance(arguments)
+    array = arguments["array"]
+    channels = list(array) if array.ndim == 4 else [array]
+    native.add_volume(channels, arguments["opacity_from"], facts, "{}", appearance)
 
 
 def _plain_mesh(given: Arguments) -> Arguments:
@@ -427,7 +470,9 @@ _SURFACE = _options.SURFACE | {"scalar", "normals", "colors", "values", "up"}
 #: What an item of each method can be changed by.
 _KNOWN: dict[str, frozenset[str]] = {
     "add": _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING | {"source"},
-    "add_volume": _options.VOLUME | (frozenset(_VOLUME) - {"frame"}) | {"array", "scalar", "copy"},
+    "add_volume": _options.VOLUME
+    | (frozenset(_VOLUME) - {"frame"})
+    | {"array", "scalar", "copy", "channel_axis", "channel_names", "opacity_from"},
     "add_mesh": _SURFACE | {"vertices", "faces"},
     "add_points": _SURFACE | {"positions", "radius"},
     "add_cells": _options.CELLS | {"points", "kinds", "values", "scalar", "missing", "up", "style"},

@@ -97,6 +97,11 @@ class SurfaceAppearance(TypedDict, total=False):
     point_radius: str
     #: The width of lines: a number of world units, or pixels, as "3px". Default: "3px".
     line_width: float | str
+    #: Files: arrows for the vectors, or ellipsoids for the tensors, of an array of points, instead
+    #: of the input: "arrows", "ellipsoids" or "arrows:velocity".
+    glyphs: str
+    #: A factor on the size of glyphs.
+    glyph_scale: float
 
 
 class CellAppearance(FieldAppearance, total=False):
@@ -139,6 +144,11 @@ class Reading(TypedDict, total=False):
     spacing: float | Vector
     #: A value that stands for “no value”.
     missing: float
+    #: Volumes: what measured the values, whatever the file says: ct, mr, emission, ultrasound or
+    #: microscopy.
+    modality: str
+    #: Volumes: the array of the file that says how opaque the samples are; of arrays, an array.
+    opacity_from: Any
     #: Label maps: a table with names and colours, of ITK-SNAP, FreeSurfer, 3D Slicer or with columns.
     labels: str
     #: Scattered samples: one radius for all, in world units.
@@ -166,8 +176,10 @@ class SourceOptions(FileOptions, total=False):
     origin: Vector
     #: Volumes of arrays: whether the array is copied.
     copy: bool
-    #: Volumes of arrays: ct, mr, emission, ultrasound or microscopy.
-    modality: str
+    #: Volumes of arrays: the axis of an array of four that has channels.
+    channel_axis: int
+    #: Volumes of arrays: the names of the channels.
+    channel_names: Sequence[str]
     #: Arrays: the world direction that is up.
     up: str | Vector
     #: Points and meshes of arrays: a colour for each.
@@ -294,6 +306,9 @@ class Saved(Framed, Page, total=False):
 
 class RenderOptions(SourceOptions, Page, total=False):
     """What `pysplatkit.render` takes beside its named arguments."""
+
+    #: Layers that are also drawn: normals, albedo, identifiers.
+    layers: Sequence[str]
 
     focal_point: Vector
     view_up: str | Vector

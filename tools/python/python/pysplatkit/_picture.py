@@ -24,11 +24,20 @@ def _restored(
     about: tuple[str, str],
     background: list[float] | None,
     dpi: float | None = None,
+    layers: dict[str, npt.NDArray[Any]] | None = None,
 ) -> Picture:
     """Returns a picture that was pickled."""
     height, width = depth.shape
     pixels = (color.reshape(-1, 4), depth.ravel(), (width, height), 1, about)
-    return Picture(_pysplatkit.Picture(*pixels), background, dpi)
+    known = None
+    if layers:
+        normals, albedo, numbers = map(layers.get, ("normals", "albedo", "identifiers"))
+        known = _pysplatkit.Layers(
+            None if normals is None else normals.reshape(-1, 3),
+            None if albedo is None else albedo.reshape(-1, 4),
+            None if numbers is None else numbers.ravel(),
+        )
+    return Picture(_pysplatkit.Picture(*pixels), background, dpi, known)
 
 
 class Picture:
@@ -42,10 +51,12 @@ class Picture:
         native: _pysplatkit.Picture,
         background: list[float] | None,
         dpi: float | None = None,
+        layers: _pysplatkit.Layers | None = None,
     ) -> None:
         self._native = native
         self._background = background
         self._dpi = dpi
+        self._layers = layers
 
     @property
     def size(self) -> tuple[int, int]:
@@ -72,6 +83,24 @@ class Picture:
         direction: (height, width). Infinite where less than half is absorbed."""
         return self._shaped(self._native.depth())
 
+    @cached_property
+    def layers(self) -> dict[str, npt.NDArray[Any]]:
+        """The layers that `render` was asked for, by their names: normals (height, width, 3) in the
+        world; albedo (height, width, 4), as `color` without light; identifiers (height, width), the
+        numbers of the inputs from 1 on."""
+        if self._layers is None:
+            return {}
+        flat = {
+            "normals": (self._layers.normals(), 3),
+            "albedo": (self._layers.albedo(), 4),
+            "identifiers": (self._layers.identifiers(), None),
+        }
+        return {
+            name: self._shaped(values, *([] if width is None else [width]))
+            for name, (values, width) in flat.items()
+            if values is not None
+        }
+
     @property
     def camera(self) -> Camera:
         """The camera that the picture was taken with; of several views, that of the first."""
@@ -88,7 +117,7 @@ class Picture:
         Args:
             background: A colour; None for transparency.
         """
-        return Picture(self._native, _options.background(background), self._dpi)
+        return Picture(self._native, _options.background(background), self._dpi, self._layers)
 
     def save(
         self,
@@ -101,18 +130,18 @@ class Picture:
         """Writes a .png, .jpg, .tiff, .webp or .exr file, which appears whole or not at all.
         Returns its path.
 
-        OpenEXR files hold colours in linear light, multiplied by opacity, and depths.
+        OpenEXR files hold colours in linear light, multiplied by opacity, depths, and layers.
 
         Args:
             path: The file.
             bits: Bits a channel: 8 or 16 for .png and .tiff, 16 or 32 for .exr. Default: the first.
-            dpi: Pixels an inch, which all but .webp store. Default: what `render` was given.
+            dpi: Pixels an inch, which files store. Default: what `render` was given.
             overwrite: Whether a file that is there already is replaced.
         """
         density = self._dpi if dpi is None else float(dpi)
 
         def write(to: Path) -> None:
-            self._native.save(to, self._background, bits, density)
+            self._native.save(to, self._background, bits, density, self._layers)
 
         return self._written(path, overwrite, write)
 
@@ -141,7 +170,7 @@ class Picture:
 
     def __reduce__(self) -> tuple[Any, ...]:
         about = (self._native.statistics, self._native.camera)
-        return _restored, (self.color, self.depth, about, self._background, self._dpi)
+        return _restored, (self.color, self.depth, about, self._background, self._dpi, self.layers)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
         array = self.rgba if dtype is None else self.rgba.astype(dtype, copy=False)

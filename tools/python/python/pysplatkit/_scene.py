@@ -147,10 +147,14 @@ class Scene:
         unit: str | None = None,
         up: str | Vector | None = None,
         labels: bool | Mapping[int, str] | str | os.PathLike[str] | None = None,
+        channel_axis: int | None = None,
+        channel_names: Sequence[str] | None = None,
+        opacity_from: Any = None,
         name: str | None = None,
         **appearance: Unpack[VolumeAppearance],
     ) -> Scene:
-        """Adds the samples of an array, which is indexed [z, y, x] whatever its order in memory.
+        """Adds the samples of an array, which is indexed [z, y, x] whatever its order in memory,
+        with one more axis if `channel_axis` names it.
 
         Args:
             array: Booleans or numbers, or an image of another package, which says where it is.
@@ -175,6 +179,11 @@ class Scene:
             labels: Whether the values are labels, each drawn where its samples are nearest; their
                 names as {value: name}; or the path of a table with names and colours. Default:
                 values that look like labels are.
+            channel_axis: The axis of an array of four that has channels, up to eight: all are
+                drawn, each in a colour (`channels`).
+            channel_names: The names of the channels.
+            opacity_from: An array of the same shape, or the name of an array of the object, that
+                says how opaque the samples are; the values give the colours.
             name: What the item is called. Default: “volume”, with a number if there are several.
             appearance: `transfer`, `range`, `opacity_unit`, `isosurfaces`, `gradient_opacity`,
                 `colormap`, `log_colors`, `kernel`, `sigma`, `extent`, `sharp` (docs/python.md).
@@ -523,6 +532,7 @@ class Scene:
         axes: bool | None = None,
         scale_bar: bool | None = None,
         caption: str | None = None,
+        layers: Sequence[str] | None = None,
     ) -> Picture:
         """Draws a picture. What is not given is as a scene file says (`open`), or as usual: as
         `splatkit render --engine cpu` does.
@@ -584,9 +594,12 @@ class Scene:
             axes: Whether the directions of the axes are drawn; of patients, their sides.
             scale_bar: Whether a round length is drawn.
             caption: A text above the picture's content.
+            layers: Layers that are also drawn, for `Picture.layers` and for .exr files: normals,
+                albedo, identifiers (docs/figures.md).
         """
         given = dict(locals())
-        return self._picture(camera, {name: given[name] for name in _GIVEN})
+        picture = self._picture(camera, {name: given[name] for name in _GIVEN})
+        return picture if layers is None else self._with_layers(picture, given)
 
     def film(
         self,
@@ -792,6 +805,19 @@ class Scene:
         fit = {**(self._described.get("framing") or {}), **json.loads(_options.fit(**view))}
         return Picture(self._pixels(camera, draw, json.dumps(fit)), background, draw.get("dpi"))
 
+    def _with_layers(self, picture: Picture, given: Mapping[str, Any]) -> Picture:
+        """Draws the layers of a picture that was drawn with these options."""
+        layers = given["layers"]
+        wanted = layers.split(",") if isinstance(layers, str) else [str(name) for name in layers]
+        options = {name: given[name] for name in _GIVEN}
+        is_placed = given["camera"] is not None or given["view"] is not None
+        draw = self._drawing(options, is_placed)
+        for name in ("background", *_options.VIEW):
+            draw.pop(name, None)
+        camera = picture.camera.to_json()
+        known = self._native.layers(camera, _options.drawn(**draw), wanted)
+        return Picture(picture._native, picture._background, picture._dpi, known)
+
     def _drawing(self, given: Mapping[str, Any], is_placed: bool) -> dict[str, Any]:
         """Returns the options of a picture by their names: those that are given, unless they are
         None, and otherwise those of the scene file. A camera or view that is given takes the place
@@ -876,7 +902,7 @@ def _arguments(source: Any, options: dict[str, Any]) -> tuple[str, dict[str, Any
                 return method, {**source, **options}
         raise _neighbours.unknown(source, "Scene.add", _ALSO)
     shape = np.shape(source)
-    if len(shape) == 3:
+    if len(shape) == (4 if options.get("channel_axis") is not None else 3):
         return "add_volume", {"array": source, **options}
     if len(shape) == 2 and shape[1] == 3:
         return "add_points", {"positions": source, **options}

@@ -47,7 +47,7 @@ class TransferFunction:
 
         Args:
             name: A name of `pysplatkit.TRANSFER_FUNCTIONS`.
-            range: The values that “mri” and “generic” are spread over.
+            range: The values that the presets of magnetic resonance and “generic” are spread over.
             diagonal: The diagonal of the box around the data. Opacities hold for 1/350 of it.
                 Default: they hold for a length of 1.
         """
