@@ -26,7 +26,7 @@ fn camera() -> Camera {
 /// Returns the layers of a picture of 48 × 48 pixels, and the picture.
 fn layers_of(device: &Device, scene: &Scene, inputs: &[Range<usize>]) -> (Layers, Picture) {
     let (camera, settings) = (camera(), Settings::new([96, 96]));
-    let drawing = Drawing { settings, factor: 2, edge_width: 1.0, eye_dome: 0.0 };
+    let drawing = Drawing { settings, factor: 2, edge_width: 1.0, eye_dome: 0.0, outlines: None };
     let mut draw = |part: Option<&Scene>, settings: &Settings| {
         let mut renderer = Renderer::new(device, part.unwrap_or(scene))?;
         Ok(renderer.render(&camera, settings)?.0)
