@@ -47,7 +47,7 @@ mod thin;
 
 pub use expression::Expression;
 pub use motion::Motion;
-pub use region::Region;
+pub use region::{Region, Sight};
 pub use statistics::{BINS, Statistics, statistics};
 pub use stream::Pass;
 pub use surface::Surface;
@@ -134,6 +134,14 @@ impl Edit {
             Self::RemoveFloaters => "remove-floaters",
             Self::KeepCluster(_) => "keep-cluster",
             Self::Normals => "normals",
+        }
+    }
+
+    /// Returns the names of the values that the edit compares, if it compares any.
+    pub fn names(&self) -> Option<impl Iterator<Item = &str>> {
+        match self {
+            Self::Where(expression) => Some(expression.names()),
+            _ => None,
         }
     }
 
@@ -263,7 +271,7 @@ fn one<S: Editable>(scene: &mut S, edit: &Edit, context: &Context) -> Result<()>
             scene.keep(&kept);
         }
         Edit::Where(expression) => {
-            let kept = met(scene, expression, context)?;
+            let kept = select(scene, expression, context)?;
             scene.keep(&kept);
         }
         Edit::Move(motion) => scene.move_by(motion),
@@ -284,8 +292,15 @@ fn one<S: Editable>(scene: &mut S, edit: &Edit, context: &Context) -> Result<()>
     Ok(())
 }
 
-/// Returns which of a scene meet a condition.
-fn met<S: Editable>(scene: &S, expression: &Expression, context: &Context) -> Result<Vec<bool>> {
+/// Returns which points, vertices or Gaussians of a scene meet a condition.
+///
+/// # Errors
+/// [`Error::Input`] for a name of no attribute.
+pub fn select<S: Editable + ?Sized>(
+    scene: &S,
+    expression: &Expression,
+    context: &Context,
+) -> Result<Vec<bool>> {
     let columns = expression.names().map(|name| match name {
         "x" | "y" | "z" | "height" => Ok(None),
         name => match scene.column(name) {

@@ -129,7 +129,7 @@ mod tests {
         (
             "Input",
             "dims type spacing endian header scalar time series dataset missing radius neighbours \
-            no-slopes labels scale rotate translate",
+            no-slopes labels scale rotate translate edit",
         ),
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (
