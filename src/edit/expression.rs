@@ -424,6 +424,9 @@ mod tests {
     fn conditions_are_met() {
         let values =
             [("a", 2.0), ("b", -3.0), ("scan angle", 7.0), ("none", f64::NAN), ("n.x_1", 0.5)];
+        let values: Vec<_> =
+            values.into_iter().chain([("x", 4.0), ("y", 1.0), ("z", 0.0)]).collect();
+
         for text in [
             "a == 2",
             "a != b && !(a < b)",
@@ -435,6 +438,7 @@ mod tests {
             "n.x_1 == 5e-1 && 1.5E+1 == 15 && .5 == n.x_1",
             "max(a, abs(b)) == 3 && sqrt(4) == a && floor(-0.5) == -1 && exp(log(a)) > 1.99",
             "b % 2 == 1",
+            "inside(\"xy:0,0,9,0,9,9\") && !inside('sphere:3,1,0,0.5') && x > 2",
             "!(none == 1) && !(none != 1) && !(none < 1) && !(none >= 1)",
         ] {
             assert!(is_met(text, &values), "{text}");
@@ -461,6 +465,11 @@ mod tests {
             ("é == 1 && max(a) > 0", 11, "takes 2 numbers"),
             ("'a > 0", 1, "no closing"),
             ("a < b < 3", 1, "a number is expected"),
+            ("a > 0 || inside(\"cube:1\")", 17, "“cube:1”"),
+            ("inside(a)", 8, "a region in quotes"),
+            ("inside(\"sphere:0,0,0,1\"", 25, "“)”"),
+            ("inside(\"sphere:0,0,0,1", 8, "no closing"),
+            ("inside(\"sphere:0,0,0,1\") > 1", 1, "a number is expected"),
         ] {
             let message = text.parse::<Expression>().unwrap_err();
             assert!(message.contains(&format!("column {column}:")), "{text}: {message}");

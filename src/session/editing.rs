@@ -36,6 +36,10 @@ impl EditedInput {
         names: &[&str],
         up: Option<DVec3>,
     ) -> Result<Self> {
+        let crs = match &data {
+            Data::Mesh(mesh) => mesh.about.crs.clone(),
+            _ => String::new(),
+        };
         let (content, stated) = match data {
             Data::Mesh(mesh) => {
                 let orientation = mesh.about.orientation.or_else(|| mesh.guess_orientation());
@@ -57,7 +61,7 @@ impl EditedInput {
             Data::Cells(_) => return Err(refused(opened, "cells")),
         };
         let up = up.unwrap_or_else(|| stated.map_or(DVec3::Y, |orientation| orientation.up));
-        let context = Context { file: opened.path().to_owned(), up, ..Context::default() };
+        let context = Context { file: opened.path().to_owned(), up, crs, ..Context::default() };
         Ok(Self { content, context })
     }
 

@@ -11,13 +11,14 @@ use splatkit::{
 };
 
 /// The names of edits, which end the name of a file before them.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     "crop",
     "where",
     "translate",
     "rotate",
     "scale",
     "matrix",
+    "reproject",
     "thin",
     "remove-floaters",
     "keep-cluster",

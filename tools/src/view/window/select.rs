@@ -179,7 +179,7 @@ impl Window {
     }
 
     /// Starts to write an input as it is edited and moved.
-    pub(super) fn save_edited(&mut self, number: usize, output: &Path) {
+    pub fn save_edited(&mut self, number: usize, output: &Path) {
         let scene = self.document.scene();
         let Some(input) = scene.inputs.get(number) else { return };
         let motion = input.transform.motion().map(Edit::Move);
