@@ -224,12 +224,12 @@ pub trait Editable: Sync {
     /// Gives all of them coordinates of another reference system.
     ///
     /// # Errors
-    /// [`Error::Input`] for places that have none there; [`Error::Argument`] for scenes whose shapes
-    /// would change with the coordinates.
+    /// [`Error::Input`] for places that have none there; [`Error::Argument`] for scenes with shapes
+    /// that change with the coordinates.
     fn reproject(&mut self, _: &Mapping) -> Result<()> {
         Err(Error::Argument(
-            "--reproject is for points and meshes: splats and trained Gaussians have shapes that no \
-             map keeps; --matrix moves them"
+            "--reproject is for points and meshes: splats and trained Gaussians have shapes that \
+             no map keeps; --matrix moves them"
                 .into(),
         ))
     }

@@ -3,6 +3,7 @@
 use super::{Data, Opened};
 use crate::{
     Error, Result,
+    about::Orientation,
     edit::{
         self, Change, Context, Edit, Editable, Expression, Pass, Statistics, Surface, statistics,
     },
@@ -44,13 +45,18 @@ impl EditedInput {
             Data::Mesh(mesh) => {
                 let orientation = mesh.about.orientation.or_else(|| mesh.guess_orientation());
                 let surface = opened.surface(mesh, |name| {
-                    names.iter().any(|wanted| wanted.eq_ignore_ascii_case(name))
+                    let plain = name.strip_prefix("scalar_").unwrap_or(name);
+                    let is_it = |wanted: &&str| {
+                        [name, plain].iter().any(|name| wanted.eq_ignore_ascii_case(name))
+                    };
+                    names.iter().any(is_it)
                 })?;
                 (Content::Surface(Box::new(surface)), orientation)
             }
             Data::Gaussians(set) => {
-                let orientation = set.about.orientation;
-                (Content::Gaussians(Box::new(set)), orientation)
+                // Trainers do not say what is up: it is −y.
+                let orientation = set.about.orientation.unwrap_or(Orientation::Y_DOWN);
+                (Content::Gaussians(Box::new(set)), Some(orientation))
             }
             Data::Hierarchy(hierarchy) => match hierarchy.gaussians()? {
                 Some(set) => (Content::Gaussians(Box::new(set)), hierarchy.header().orientation),

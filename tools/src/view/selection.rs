@@ -140,9 +140,9 @@ impl Selection {
         (scene, loaded_by): (Description, LoadedBy),
         tell: impl Fn() + Send + 'static,
     ) -> Result<(), String> {
+        let condition = self.condition.as_deref().map(str::parse::<Expression>).transpose()?;
         (self.selected, self.finding) = (None, None);
-        let Some(condition) = &self.condition else { return Ok(()) };
-        let condition: Expression = condition.parse()?;
+        let Some(condition) = condition else { return Ok(()) };
         let cache = Arc::clone(&self.cache);
         let (send, found) = channel();
         let thread = std::thread::Builder::new().name("selection".into());

@@ -172,9 +172,9 @@ fn edited_pictures_are_those_of_edited_files() {
     let folder = Folder::new();
     folder.put("a.ply", cloud());
     let edits = "--edit where:x>9&&z<1 --edit a.ply=crop:xy:0,0,30,0,30,30,0,30";
-    let view = "--size 64x48 --engine cpu --up +Z --view top";
-    let report = folder.json(&format!("render a.ply -o a.png {edits} {view} --json"));
-    assert_eq!(report["items"][0]["count"].as_u64().or(report["count"].as_u64()), Some(600));
+    // Greys of intensities are spread over all points of a file.
+    let view = "--size 64x48 --engine cpu --up +Z --view top --color orange";
+    folder.run(&format!("render a.ply -o a.png {edits} {view}")).ok();
     folder.run("convert a.ply -o b.points.ply --where x>9&&z<1 --crop xy:0,0,30,0,30,30,0,30").ok();
     folder.run(&format!("render b.points.ply -o b.png {view}")).ok();
     let [a, b] = ["a.png", "b.png"].map(|name| std::fs::read(folder.path(name)).unwrap());
