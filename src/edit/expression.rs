@@ -467,7 +467,7 @@ mod tests {
             ("a < b < 3", 1, "a number is expected"),
             ("a > 0 || inside(\"cube:1\")", 17, "“cube:1”"),
             ("inside(a)", 8, "a region in quotes"),
-            ("inside(\"sphere:0,0,0,1\"", 25, "“)”"),
+            ("inside(\"sphere:0,0,0,1\"", 24, "“)”"),
             ("inside(\"sphere:0,0,0,1", 8, "no closing"),
             ("inside(\"sphere:0,0,0,1\") > 1", 1, "a number is expected"),
         ] {

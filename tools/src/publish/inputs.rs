@@ -2,9 +2,9 @@
 
 use crate::{failure::Failure, job::Loaded, progress::Progress};
 use splatkit::{
-    edit::Edit,
     Device, Error,
     compare::compare_pictures,
+    edit::Edit,
     formats::{self, Format, Kind},
     input::{Limits, is_remote},
     scene::Item,

@@ -141,7 +141,9 @@ fn edits(ui: &mut Ui, scene: &Description, actions: &mut Vec<Action>) {
         for (at, edit) in input.edits.iter().enumerate() {
             ui.push_id((number, at), |ui| {
                 ui.horizontal(|ui| {
-                    if ui.small_button("×").on_hover_text("Remove the edit").clicked() {
+                    let button = ui.small_button("×").on_hover_text("Remove the edit");
+                    let name = format!("Remove edit {}", at + 1);
+                    if button.accessible_name(name).clicked() {
                         actions.push(Action::change(move |scene| {
                             scene.inputs[number].edits.remove(at);
                         }));
