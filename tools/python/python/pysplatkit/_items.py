@@ -430,7 +430,11 @@ SAID = {
 _SURFACE = _options.SURFACE | {"scalar", "normals", "colors", "values", "up"}
 #: What an item of each method can be changed by.
 _KNOWN: dict[str, frozenset[str]] = {
-    "add": _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING | {"source"},
+    "add": _options.VOLUME
+    | _options.SURFACE
+    | _options.CELLS
+    | _options.READING
+    | {"source", "edits"},
     "add_volume": _options.VOLUME | (frozenset(_VOLUME) - {"frame"}) | {"array", "scalar", "copy"},
     "add_mesh": _SURFACE | {"vertices", "faces"},
     "add_points": _SURFACE | {"positions", "radius"},
