@@ -41,8 +41,11 @@ fn key(harness: &mut Driven, modifiers: Modifiers, key: Key) {
     steps(harness, 2);
 }
 
-/// Looks from above, and rests.
+/// Looks from above, against z, and rests.
 fn from_above(harness: &mut Driven) {
+    rest(harness);
+    window(harness).document.adjust(|scene| scene.framing.up = Some(DVec3::Z));
+    steps(harness, 2);
     rest(harness);
     window(harness).apply(super::super::action::Action::View(Some(Side::Top)));
     steps(harness, 2);
@@ -131,6 +134,7 @@ fn a_lasso_selects_what_is_deleted_undone_and_saved() {
     key(&mut harness, Modifiers::COMMAND, Key::I);
     assert_eq!(counts(&mut harness), Some([231, 441]));
     key(&mut harness, Modifiers::COMMAND, Key::I);
+    assert_eq!(counts(&mut harness), Some([210, 441]));
     key(&mut harness, Modifiers::NONE, Key::Delete);
     assert_eq!((edits(&mut harness).len(), left(&mut harness)), (1, 231));
     let cut = picture(&mut harness);

@@ -18,7 +18,7 @@ use splatkit::{
 use std::path::{Path, PathBuf};
 
 /// How much deeper than what is seen an outline selects, as a share of the scene's diagonal.
-const DEEPER: f64 = 0.005;
+const DEEPER: f64 = 0.02;
 
 impl Window {
     /// Does what a user asks for of the selection.
@@ -60,6 +60,7 @@ impl Window {
             let Some([_, far]) = shown else {
                 return self.say("nothing is seen in the outline", true);
             };
+            // What a picture shows may lie a sheet before the points that it is of.
             let diagonal = scene_view.stage.loaded.subject.bounds.diagonal();
             depths[1] = rounded(far + DEEPER * diagonal);
         }
@@ -149,6 +150,9 @@ impl Window {
         let (Some(condition), Some(selected)) =
             (self.selection.condition.clone(), self.selection.selected.take())
         else {
+            if self.selection.finding.is_some() {
+                self.say("the selection is still being made", false);
+            }
             return;
         };
         let kept = if keeps { condition } else { inverted(Some(&condition)) };
