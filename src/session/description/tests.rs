@@ -341,7 +341,7 @@ fn inputs_are_edited_before_they_are_drawn() {
     assert!(low.x > 11.0 && high.x < 13.0, "{low} {high}");
     // Edits are for what has points of its own.
     let volume = crate::volume::phantoms::Phantom::Ball.sample([4; 3]).unwrap();
-    let mut field = scene.clone();
+    let mut field = scene;
     (field.inputs[0].file, field.inputs[0].transform) = ("v.nrrd".into(), Default::default());
     field.inputs[0].appearance = AppearanceEntry::default();
     let folder = Folder::new();
