@@ -3,6 +3,8 @@
 //! A small language of its own: the crates of this kind evaluate one row at a time, by maps of
 //! names.
 
+use super::Region;
+use glam::DVec3;
 use std::{fmt, str::FromStr};
 
 /// A condition, which can be parsed from a text.
@@ -10,7 +12,8 @@ use std::{fmt, str::FromStr};
 /// Numbers have `+`, `-`, `*`, `/`, `%`, and the functions `abs`, `sqrt`, `exp`, `log`, `floor`,
 /// `min` and `max`. They are compared by `==`, `!=`, `<`, `<=`, `>` and `>=`. Conditions are joined
 /// by `&&`, `||` and `!`. A name of other characters than letters, digits, `_` and `.` is written
-/// in quotes. A comparison with a missing value is not met.
+/// in quotes. A comparison with a missing value is not met. `inside("REGION")` is met in a
+/// [`Region`], such as `inside("sphere:0,0,0,2")`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
     text: String,
@@ -28,6 +31,8 @@ enum Node {
     Not(Box<Node>),
     Both(Operator, Box<[Node; 2]>),
     Call(Function, Vec<Node>),
+    /// Whether the place lies in a region, by the indices of the names x, y and z.
+    Inside(Box<Region>, [usize; 3]),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,8 +92,11 @@ const FUNCTIONS: [(&str, Function, usize); 7] = [
     ("max", Function::Max, 2),
 ];
 
+/// The name of the function that tests a region.
+const INSIDE: &str = "inside";
+
 /// The most characters of an expression, and the deepest nesting.
-const LONGEST: usize = 1 << 14;
+const LONGEST: usize = 1 << 17;
 const DEEPEST: usize = 100;
 
 /// What a part of an expression is.
@@ -181,6 +189,7 @@ impl Node {
                     Operator::Rest => left.rem_euclid(right()),
                 }
             }
+            Self::Inside(region, axes) => truth(region.contains(DVec3::from_array(axes.map(of)))),
             Self::Call(function, arguments) => {
                 let first = arguments[0].value(of);
                 match function {
@@ -288,12 +297,7 @@ impl<'a> Parser<'a> {
         match self.rest.chars().next() {
             Some('0'..='9' | '.') => Ok((Node::Number(self.number()?), Kind::Number)),
             Some(quote @ ('"' | '\'' | '“')) => {
-                let end = if quote == '“' { '”' } else { quote };
-                let inner = &self.rest[quote.len_utf8()..];
-                let Some((name, rest)) = inner.split_once(end) else {
-                    return Err(format!("column {column}: the name has no closing {end}"));
-                };
-                self.rest = rest;
+                let name = self.quoted(quote, "name")?;
                 Ok((self.named(name, column), Kind::Number))
             }
             Some(first) if first.is_alphabetic() || first == '_' => {
@@ -302,13 +306,45 @@ impl<'a> Parser<'a> {
                 let (name, rest) = self.rest.split_at(end);
                 self.rest = rest;
                 if self.takes("(") {
-                    self.call(name, column)
+                    match name {
+                        INSIDE => self.inside(),
+                        name => self.call(name, column),
+                    }
                 } else {
                     Ok((self.named(name, column), Kind::Number))
                 }
             }
             _ => Err(self.wrong("a number, a name or “(”")),
         }
+    }
+
+    /// Reads a text in quotes, of which the first comes next. `what` names it in errors.
+    fn quoted(&mut self, quote: char, what: &str) -> Parsed<&'a str> {
+        let column = self.column();
+        let end = if quote == '“' { '”' } else { quote };
+        let Some((text, rest)) = self.rest[quote.len_utf8()..].split_once(end) else {
+            return Err(format!("column {column}: the {what} has no closing {end}"));
+        };
+        self.rest = rest;
+        Ok(text)
+    }
+
+    /// Reads the region of `inside(`, and what closes it.
+    fn inside(&mut self) -> Parsed<(Node, Kind)> {
+        let column = self.column();
+        let Some(quote @ ('"' | '\'' | '“')) = self.rest.chars().next() else {
+            return Err(self.wrong("a region in quotes, as in inside(\"sphere:0,0,0,2\"),"));
+        };
+        let region = self.quoted(quote, "region")?;
+        let region = region.parse().map_err(|wrong| format!("column {column}: {wrong}"))?;
+        if !self.takes(")") {
+            return Err(self.wrong("“)”"));
+        }
+        let axes = ["x", "y", "z"].map(|name| match self.named(name, column) {
+            Node::Value(index) => index,
+            _ => 0,
+        });
+        Ok((Node::Inside(Box::new(region), axes), Kind::Condition))
     }
 
     /// Returns the node of a name.
@@ -323,7 +359,7 @@ impl<'a> Parser<'a> {
     fn call(&mut self, name: &str, column: usize) -> Parsed<(Node, Kind)> {
         let function = FUNCTIONS.iter().find(|(known, ..)| *known == name);
         let Some((_, function, count)) = function else {
-            let known = FUNCTIONS.map(|(name, ..)| name).join(", ");
+            let known = FUNCTIONS.map(|(name, ..)| name).join(", ") + ", " + INSIDE;
             return Err(format!("column {column}: there is no function “{name}”, only {known}"));
         };
         let mut arguments = Vec::new();
@@ -388,6 +424,9 @@ mod tests {
     fn conditions_are_met() {
         let values =
             [("a", 2.0), ("b", -3.0), ("scan angle", 7.0), ("none", f64::NAN), ("n.x_1", 0.5)];
+        let values: Vec<_> =
+            values.into_iter().chain([("x", 4.0), ("y", 1.0), ("z", 0.0)]).collect();
+
         for text in [
             "a == 2",
             "a != b && !(a < b)",
@@ -399,6 +438,7 @@ mod tests {
             "n.x_1 == 5e-1 && 1.5E+1 == 15 && .5 == n.x_1",
             "max(a, abs(b)) == 3 && sqrt(4) == a && floor(-0.5) == -1 && exp(log(a)) > 1.99",
             "b % 2 == 1",
+            "inside(\"xy:0,0,9,0,9,9\") && !inside('sphere:3,1,0,0.5') && x > 2",
             "!(none == 1) && !(none != 1) && !(none < 1) && !(none >= 1)",
         ] {
             assert!(is_met(text, &values), "{text}");
@@ -425,6 +465,11 @@ mod tests {
             ("é == 1 && max(a) > 0", 11, "takes 2 numbers"),
             ("'a > 0", 1, "no closing"),
             ("a < b < 3", 1, "a number is expected"),
+            ("a > 0 || inside(\"cube:1\")", 17, "“cube:1”"),
+            ("inside(a)", 8, "a region in quotes"),
+            ("inside(\"sphere:0,0,0,1\"", 24, "“)”"),
+            ("inside(\"sphere:0,0,0,1", 8, "no closing"),
+            ("inside(\"sphere:0,0,0,1\") > 1", 1, "a number is expected"),
         ] {
             let message = text.parse::<Expression>().unwrap_err();
             assert!(message.contains(&format!("column {column}:")), "{text}: {message}");

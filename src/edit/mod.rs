@@ -10,6 +10,7 @@
 //! | `expression` | what `where` compares |
 //! | `region` | the shapes of `crop` |
 //! | `motion` | moves, turns, scales and matrices |
+//! | `reproject` | other coordinate reference systems |
 //! | `thin`, `merge` | fewer points, and fewer splats that look the same |
 //! | `clusters` | floaters, and the largest parts |
 //! | `surface`, `records`, `gaussians`, `splats` | the scenes that are edited |
@@ -37,6 +38,7 @@ mod merge;
 mod motion;
 mod records;
 mod region;
+mod reproject;
 mod splats;
 mod statistics;
 mod stream;
@@ -47,9 +49,11 @@ mod thin;
 
 pub use expression::Expression;
 pub use motion::Motion;
-pub use region::Region;
+pub use region::{Region, Sight};
+pub use reproject::{Crs, Mapping, Reprojection};
 pub use statistics::{BINS, Statistics, statistics};
 pub use stream::Pass;
+pub(crate) use stream::grid_of_degrees;
 pub use surface::Surface;
 pub use thin::Thin;
 
@@ -66,6 +70,8 @@ pub enum Edit {
     Where(Expression),
     /// Move, turn or scale everything. Which axis is up stays as the scene says.
     Move(Motion),
+    /// Give points the coordinates of another reference system. Heights stay.
+    Reproject(Reprojection),
     /// Keep fewer points, evenly spread; or merge splats.
     Thin(Thin),
     /// Remove small clusters far from others.
@@ -110,6 +116,7 @@ impl Edit {
                 let rows = numbers()?.try_into().map_err(|_| "a matrix has 16 numbers")?;
                 Motion::matrix(rows).map(Self::Move)
             }
+            "reproject" => value.parse().map(Self::Reproject),
             "thin" => value.parse().map(Self::Thin),
             "keep-cluster" => {
                 let count = value.trim().parse().ok().filter(|count: &usize| *count > 0);
@@ -119,7 +126,7 @@ impl Edit {
             "normals" => empty(Self::Normals),
             _ => Err(format!(
                 "there is no edit “{name}”, only crop, where, translate, rotate, scale, matrix, \
-                 thin, remove-floaters, keep-cluster and normals"
+                 reproject, thin, remove-floaters, keep-cluster and normals"
             )),
         }
     }
@@ -130,6 +137,7 @@ impl Edit {
             Self::Crop(_) => "crop",
             Self::Where(_) => "where",
             Self::Move(_) => "move",
+            Self::Reproject(_) => "reproject",
             Self::Thin(_) => "thin",
             Self::RemoveFloaters => "remove-floaters",
             Self::KeepCluster(_) => "keep-cluster",
@@ -137,9 +145,17 @@ impl Edit {
         }
     }
 
+    /// Returns the names of the values that the edit compares, if it compares any.
+    pub fn names(&self) -> Option<impl Iterator<Item = &str>> {
+        match self {
+            Self::Where(expression) => Some(expression.names()),
+            _ => None,
+        }
+    }
+
     /// Returns whether what becomes of one point depends on no other point.
     pub fn is_local(&self) -> bool {
-        matches!(self, Self::Crop(_) | Self::Where(_) | Self::Move(_))
+        matches!(self, Self::Crop(_) | Self::Where(_) | Self::Move(_) | Self::Reproject(_))
     }
 }
 
@@ -163,11 +179,25 @@ pub struct Context {
     pub up: DVec3,
     /// Bytes of memory that edits may use beside the scene.
     pub memory: u64,
+    /// The coordinate reference system, as the file says it; empty if it does not.
+    pub crs: String,
+}
+
+impl Context {
+    /// Returns what is known of a scene after these edits.
+    fn after(&self, edits: &[Edit]) -> Self {
+        let system = edits.iter().rev().find_map(|edit| match edit {
+            Edit::Reproject(reprojection) => Some(reprojection.to.to_string()),
+            _ => None,
+        });
+        Self { crs: system.unwrap_or_else(|| self.crs.clone()), ..self.clone() }
+    }
 }
 
 impl Default for Context {
     fn default() -> Self {
-        Self { file: "scene".into(), up: DVec3::Z, memory: memory::most().unwrap_or(u64::MAX) }
+        let memory = memory::most().unwrap_or(u64::MAX);
+        Self { file: "scene".into(), up: DVec3::Z, memory, crs: String::new() }
     }
 }
 
@@ -190,6 +220,19 @@ pub trait Editable: Sync {
 
     /// Moves all.
     fn move_by(&mut self, motion: &Motion);
+
+    /// Gives all of them coordinates of another reference system.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for places that have none there; [`Error::Argument`] for scenes with shapes
+    /// that change with the coordinates.
+    fn reproject(&mut self, _: &Mapping) -> Result<()> {
+        Err(Error::Argument(
+            "--reproject is for points and meshes: splats and trained Gaussians have shapes that \
+             no map keeps; --matrix moves them"
+                .into(),
+        ))
+    }
 
     /// Returns how far one of them reaches around its place, in world units.
     fn reach(&self, _: usize) -> f32 {
@@ -232,9 +275,9 @@ pub trait Editable: Sync {
 /// use.
 pub fn apply<S: Editable>(scene: &mut S, edits: &[Edit], context: &Context) -> Result<Vec<Change>> {
     let mut changes = Vec::new();
-    for edit in edits {
+    for (at, edit) in edits.iter().enumerate() {
         let before = scene.count() as u64;
-        one(scene, edit, context)?;
+        one(scene, edit, &context.after(&edits[..at]))?;
         changes.push(Change { edit: edit.name(), before, after: scene.count() as u64 });
         check_left(&changes, context)?;
     }
@@ -263,10 +306,11 @@ fn one<S: Editable>(scene: &mut S, edit: &Edit, context: &Context) -> Result<()>
             scene.keep(&kept);
         }
         Edit::Where(expression) => {
-            let kept = met(scene, expression, context)?;
+            let kept = select(scene, expression, context)?;
             scene.keep(&kept);
         }
         Edit::Move(motion) => scene.move_by(motion),
+        Edit::Reproject(reprojection) => scene.reproject(&reprojection.mapping(context)?)?,
         Edit::Thin(thin) => scene.thin(thin)?,
         Edit::RemoveFloaters | Edit::KeepCluster(_) => {
             clusters::check_memory(edit.name(), scene.count(), context)?;
@@ -284,8 +328,15 @@ fn one<S: Editable>(scene: &mut S, edit: &Edit, context: &Context) -> Result<()>
     Ok(())
 }
 
-/// Returns which of a scene meet a condition.
-fn met<S: Editable>(scene: &S, expression: &Expression, context: &Context) -> Result<Vec<bool>> {
+/// Returns which points, vertices or Gaussians of a scene meet a condition.
+///
+/// # Errors
+/// [`Error::Input`] for a name of no attribute.
+pub fn select<S: Editable + ?Sized>(
+    scene: &S,
+    expression: &Expression,
+    context: &Context,
+) -> Result<Vec<bool>> {
     let columns = expression.names().map(|name| match name {
         "x" | "y" | "z" | "height" => Ok(None),
         name => match scene.column(name) {

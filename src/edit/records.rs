@@ -1,6 +1,6 @@
 //! Points with attributes, read in pieces.
 
-use super::{Editable, Motion, find, retain, thin::Thin};
+use super::{Editable, Mapping, Motion, find, retain, thin::Thin};
 use crate::{
     Deadline, Result,
     formats::Records,
@@ -65,6 +65,17 @@ impl Editable for Records {
         for normal in &mut self.normals {
             *normal = motion.normal(normal.as_dvec3()).as_vec3();
         }
+    }
+
+    fn reproject(&mut self, mapping: &Mapping) -> Result<()> {
+        for (normal, place) in self.normals.iter_mut().zip(&self.positions) {
+            let turned = mapping.linear(*place).inverse().transpose() * normal.as_dvec3();
+            *normal = turned.normalize_or_zero().as_vec3();
+        }
+        for place in &mut self.positions {
+            *place = mapping.place(*place)?;
+        }
+        Ok(())
     }
 
     fn thin(&mut self, thin: &Thin) -> Result<()> {

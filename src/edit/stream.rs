@@ -6,7 +6,7 @@
 //! it keeps.
 
 use super::{
-    Change, Context, Edit, Editable, check_left, clusters,
+    Change, Context, Crs, Edit, Editable, check_left, clusters,
     clusters::Clusters,
     one,
     thin::{Discs, Thin},
@@ -133,24 +133,48 @@ impl<'a> Pass<'a> {
     pub(crate) fn bounds(&self) -> [DVec3; 2] {
         let mut corners: Vec<DVec3> = Vec::new();
         for stream in &self.streams {
-            let [low, high] = stream.bounds().map(|corner| stream.origin() + corner.as_dvec3());
-            corners.extend((0..8).map(|corner| {
-                DVec3::from_array(
-                    [0, 1, 2].map(
-                        |axis| {
-                            if corner >> axis & 1 == 0 { low[axis] } else { high[axis] }
-                        },
-                    ),
-                )
-            }));
+            let ends = stream.bounds().map(|corner| stream.origin() + corner.as_dvec3());
+            let context = self.context_of(stream);
+            corners.extend(self.moved(sampled(ends, 1), &context));
         }
-        for edit in self.edits {
-            if let Edit::Move(motion) = edit {
-                corners.iter_mut().for_each(|corner| *corner = motion.place(*corner));
+        around(&corners)
+    }
+
+    /// Returns some points of a box where the edits move them.
+    fn moved(&self, mut places: Vec<DVec3>, context: &Context) -> Vec<DVec3> {
+        for (at, edit) in self.edits.iter().enumerate() {
+            match edit {
+                Edit::Move(motion) => {
+                    places.iter_mut().for_each(|place| *place = motion.place(*place));
+                }
+                Edit::Reproject(reprojection) => {
+                    // What fails here fails again where points are edited, with an error.
+                    let context = context.after(&self.edits[..at]);
+                    let Ok(mapping) = reprojection.mapping(&context) else { continue };
+                    // A map bends the sides of a box.
+                    let places_there = sampled(around(&places), SAMPLED).into_iter();
+                    places = places_there.filter_map(|place| mapping.place(place).ok()).collect();
+                    let [low, high] = around(&places);
+                    places = sampled([low, high], 1);
+                }
+                _ => {}
             }
         }
-        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        corners.iter().fold(none, |[low, high], at| [low.min(*at), high.max(*at)])
+        places
+    }
+
+    /// Returns what edits need to know of a file.
+    fn context_of(&self, stream: &Stream) -> Context {
+        let file = stream.path().to_owned();
+        Context { file, crs: stream.crs(), ..self.context.clone() }
+    }
+
+    /// Returns the system that the last reprojection leads to, if there is one.
+    pub(crate) fn crs(&self) -> Option<&Crs> {
+        self.edits.iter().rev().find_map(|edit| match edit {
+            Edit::Reproject(reprojection) => Some(&reprojection.to),
+            _ => None,
+        })
     }
 
     /// Returns the middle of all points, in whole numbers.
@@ -162,7 +186,11 @@ impl<'a> Pass<'a> {
     /// Returns the steps and the offset of whole numbers that positions are stored as, if the first
     /// file has such and nothing is moved.
     pub(crate) fn grid(&self) -> Option<[DVec3; 2]> {
-        let is_moved = self.edits.iter().any(|edit| matches!(edit, Edit::Move(_)));
+        if self.crs().is_some_and(Crs::is_geographic) {
+            return Some(grid_of_degrees(self.bounds()));
+        }
+        let is_moved =
+            self.edits.iter().any(|edit| matches!(edit, Edit::Move(_) | Edit::Reproject(_)));
         self.streams.first().and_then(Stream::grid).filter(|_| !is_moved)
     }
 
@@ -272,15 +300,18 @@ impl<'a> Pass<'a> {
             step.restart()?;
         }
         let mut counts = vec![0; steps.len() + 1];
-        let (context, all) = (&self.context, self.points());
+        let all = self.points();
         let edits: Vec<Edit> = self.edits[..head].to_vec();
         let mut seen = 0;
         for stream in &self.streams {
-            let context = &Context { file: stream.path().to_owned(), ..context.clone() };
+            let context = &self.context_of(stream);
+            // What is known of a scene changes with its system.
+            let contexts: Vec<Context> =
+                (0..self.edits.len()).map(|at| context.after(&self.edits[..at])).collect();
             let begun = |mut records: Records| {
                 let before = records.count() as u64;
                 let mut counts = vec![before];
-                for edit in &edits {
+                for (edit, context) in edits.iter().zip(&contexts) {
                     one(&mut records, edit, context)?;
                     counts.push(records.count() as u64);
                 }
@@ -291,7 +322,7 @@ impl<'a> Pass<'a> {
                 counts.iter_mut().zip(&of_piece).for_each(|(count, more)| *count += more);
                 seen += of_piece[0];
                 for (at, step) in steps.iter_mut().enumerate().skip(head) {
-                    step.make(&mut records, context)?;
+                    step.make(&mut records, &contexts[at])?;
                     counts[at + 1] += records.count() as u64;
                 }
                 tell(self.watch, seen, all);
@@ -300,6 +331,38 @@ impl<'a> Pass<'a> {
         }
         Ok(counts)
     }
+}
+
+/// Points along a side of a box that is mapped to another system.
+const SAMPLED: usize = 16;
+
+/// The steps of longitudes and latitudes: 0.1 mm.
+const DEGREES: f64 = 1e-9;
+
+/// Returns points of a box, its corners among them: this many steps along x and y.
+fn sampled([low, high]: [DVec3; 2], steps: usize) -> Vec<DVec3> {
+    let at = |index: usize| {
+        let side = steps + 1;
+        let share = |step: usize| step as f64 / steps as f64;
+        let z = if index / (side * side) == 0 { 0.0 } else { 1.0 };
+        let share = DVec3::new(share(index % side), share(index / side % side), z);
+        low + share * (high - low)
+    };
+    (0..2 * (steps + 1) * (steps + 1)).map(at).collect()
+}
+
+/// Returns the corners of the box around points.
+fn around(places: &[DVec3]) -> [DVec3; 2] {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    places.iter().fold(none, |[low, high], at| [low.min(*at), high.max(*at)])
+}
+
+/// Returns the steps and the offset of positions in degrees with heights in another unit.
+pub(crate) fn grid_of_degrees([low, high]: [DVec3; 2]) -> [DVec3; 2] {
+    let size = high - low;
+    let step = |size: f64, least: f64| 10f64.powf((size * 1e-9).log10().ceil()).max(least);
+    let flat = step(size.x.max(size.y), DEGREES);
+    [DVec3::new(flat, flat, step(size.z, 1e-4)), low.floor()]
 }
 
 impl Step<'_> {

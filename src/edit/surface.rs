@@ -1,7 +1,7 @@
 //! Meshes and point clouds in memory.
 
 use super::{
-    Editable, Motion, find,
+    Editable, Mapping, Motion, find,
     records::{plain_column, plain_names},
     retain,
     thin::Thin,
@@ -86,6 +86,29 @@ impl Editable for Surface {
         if linear.determinant() < 0.0 {
             mesh.triangles.par_iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
         }
+    }
+
+    fn reproject(&mut self, mapping: &Mapping) -> Result<()> {
+        let mesh = &mut self.mesh;
+        let place = |place: &Vec3| mesh.origin + place.as_dvec3();
+        let places: Vec<DVec3> = mesh.positions.iter().map(place).collect();
+        let Some(middle) = places.get(places.len() / 2) else { return Ok(()) };
+        for (normal, place) in mesh.normals.iter_mut().zip(&places) {
+            let turned = mapping.linear(*place).inverse().transpose() * normal.as_dvec3();
+            *normal = turned.normalize_or_zero().as_vec3();
+        }
+        let scale = mapping.linear(*middle).determinant().abs().sqrt() as f32;
+        mesh.radii.par_iter_mut().for_each(|radius| *radius *= scale);
+        let origin = mapping.place(*middle)?;
+        for (position, place) in mesh.positions.iter_mut().zip(&places) {
+            *position = (mapping.place(*place)? - origin).as_vec3();
+        }
+        for sensor in &mut mesh.sensors {
+            let place = mapping.place(mesh.origin + sensor.position.as_dvec3())?;
+            sensor.position = (place - origin).as_vec3();
+        }
+        mesh.origin = origin;
+        Ok(())
     }
 
     fn thin(&mut self, thin: &Thin) -> Result<()> {

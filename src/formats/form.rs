@@ -127,6 +127,11 @@ pub(super) trait Form: Send + Sync {
     /// Returns how the points stand, if the file or the format's convention says so.
     fn orientation(&self) -> Option<Orientation>;
 
+    /// Returns the coordinate reference system; empty if the file does not say.
+    fn crs(&self, _: &Source) -> String {
+        String::new()
+    }
+
     fn has_normals(&self) -> bool;
 
     fn has_colors(&self) -> bool;

@@ -18,6 +18,8 @@ pub(crate) struct PointLayout {
     pub grid: Option<[DVec3; 2]>,
     /// A file whose coordinate reference system is kept, if the format can hold it.
     pub crs: Option<std::path::PathBuf>,
+    /// The EPSG code of the coordinate reference system, and whether that is geographic.
+    pub code: Option<(u16, bool)>,
 }
 
 /// A file of points that is being written. It appears once it is finished.

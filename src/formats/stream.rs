@@ -154,6 +154,11 @@ impl<'a> Stream<'a> {
         self.form.orientation()
     }
 
+    /// Returns the coordinate reference system, as the file says it; empty if it does not.
+    pub(crate) fn crs(&self) -> String {
+        self.form.crs(&self.source)
+    }
+
     /// Guesses how its points stand ([`Mesh::guess_orientation`]), from pieces spread over the
     /// file.
     ///

@@ -53,11 +53,12 @@ pub use coloring::{Coloring, SurfaceColor, check_log, visible_range_of};
 pub use data::{Data, warn_of_holes};
 pub use description::{
     AppearanceEntry, Axis, Background, CameraEntry, ChannelEntry, ChannelName, ClipEntry, ClipSide,
-    ColorEntry, Composite, Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry,
-    LightName, LimitsEntry, Loaded, LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place,
-    ReadInput, ReadingEntry, Rotation, Samples, TransferEntry, TransformEntry,
+    ColorEntry, Composite, Description, EditEntry, Engine, InputEntry, IsosurfaceEntry,
+    KernelEntry, LightName, LimitsEntry, Loaded, LoadedInput, OverlayEntry, PaperLength,
+    PictureEntry, Place, ReadInput, ReadingEntry, Rotation, Samples, TransferEntry, TransformEntry,
 };
 pub use drawing::Drawing;
+pub use editing::EditedInput;
 pub use facts::Facts;
 pub use framing::{Framing, Side};
 pub use glyphs::{GlyphShape, Glyphs};

@@ -56,7 +56,7 @@ fn the_list_of_formats_is_current() {
 }
 
 /// The features that are not of formats.
-const OTHERS: [&str; 10] = [
+const OTHERS: [&str; 11] = [
     "default",
     "dx12",
     "files",
@@ -65,6 +65,7 @@ const OTHERS: [&str; 10] = [
     "pictures",
     "reference",
     "remote",
+    "reproject",
     "vulkan",
     "webgpu",
 ];

@@ -3,6 +3,7 @@
 /// Fields of a scene whose flags have other names.
 const FLAGS: &[(&str, &[&str])] = &[
     ("isosurfaces", &["iso"]),
+    ("edits", &["edit"]),
     ("camera", &["camera", "view-of"]),
     ("clips", &["clip", "cut-out"]),
     ("shade", &["shade", "no-shade", "flat"]),

@@ -162,6 +162,7 @@ impl Given {
         let Ok(scene) = serde_json::to_value(named) else { return self.clone() };
         let inputs = scene["inputs"].as_array().into_iter().flatten();
         for part in inputs.chain([&scene]) {
+            all.extend(part.get("edits").map(|_| "edit".to_owned()));
             let parts = ["reading", "transform", "appearance", "framing", "picture", "overlay"];
             for (field, value) in
                 parts.into_iter().filter_map(|name| part[name].as_object()).flatten()

@@ -129,7 +129,7 @@ mod tests {
         (
             "Input",
             "dims type spacing endian header scalar time series dataset missing radius neighbours \
-            no-slopes labels modality opacity-from scale rotate translate",
+            no-slopes labels modality opacity-from scale rotate translate edit",
         ),
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (
@@ -159,7 +159,8 @@ mod tests {
         ("Hierarchy", "preset lossless radius-scale up unit degree spz-version memory"),
         (
             "Edits",
-            "crop where translate rotate scale matrix thin remove-floaters keep-cluster normals",
+            "crop where translate rotate scale matrix reproject from-crs thin remove-floaters \
+            keep-cluster normals",
         ),
         ("Parts", "plan parts part index join"),
         ("Remote inputs", "cache cache-size allow-host"),

@@ -43,6 +43,16 @@ impl<T> InputValue<T> {
         Self { file: None, value }
     }
 
+    /// A value for one input.
+    pub fn of_file(file: PathBuf, value: T) -> Self {
+        Self { file: Some(file), value }
+    }
+
+    /// Returns the value.
+    pub fn value(&self) -> &T {
+        &self.value
+    }
+
     /// Returns an input's own value, or else that of all inputs.
     pub fn of<'a>(values: &'a [Self], path: &Path) -> Option<&'a T> {
         let mut singles = values.iter().filter_map(Self::single);

@@ -19,6 +19,7 @@ mod completions;
 mod convert;
 mod demo;
 mod describe;
+mod edit;
 #[doc(hidden)]
 pub mod engine;
 #[doc(hidden)]

@@ -1,6 +1,7 @@
 //! The flags of a scene.
 
 use crate::{
+    edit::EditFlags,
     failure::Failure,
     given::Given,
     load::LoadFlags,
@@ -30,6 +31,8 @@ pub struct SceneFlags {
     #[command(flatten)]
     transform: TransformFlags,
     #[command(flatten)]
+    edit: EditFlags,
+    #[command(flatten)]
     show: ShowFlags,
 }
 
@@ -44,6 +47,7 @@ impl SceneFlags {
     pub fn apply(&self, scene: &mut Description) -> Result<(), Failure> {
         self.load.apply(scene);
         self.transform.apply(scene)?;
+        self.edit.apply(scene)?;
         self.show.apply(scene)
     }
 }

@@ -9,7 +9,7 @@ use super::{
             raw_point::RawPoint,
         },
     },
-    Header, Point, attribute, packed, plain_bytes,
+    Header, Point, attribute, describe, packed, plain_bytes,
 };
 use crate::{
     Error, Result,
@@ -146,6 +146,10 @@ impl Form for Pieces {
 
     fn orientation(&self) -> Option<Orientation> {
         Some(Orientation::SURVEY)
+    }
+
+    fn crs(&self, source: &Source) -> String {
+        describe::crs(source, &self.header)
     }
 
     fn bytes(&self, piece: usize) -> Range<usize> {

@@ -208,7 +208,7 @@ impl Shape {
             layout.has_colors || fields.iter().any(|f| matches!(f, Some(Field::Channel(_))));
         let mut records = match &layout.crs {
             Some(file) => systems(file)?,
-            None => Vec::new(),
+            None => layout.code.into_iter().map(keys).collect(),
         };
         let extra = described(&layout, &fields);
         if !extra.is_empty() {
@@ -386,6 +386,19 @@ fn grid(layout: &PointLayout) -> [DVec3; 2] {
         let step = 10f64.powf((extent * FINENESS).log10().ceil()).clamp(1e-12, 1e6);
         [DVec3::splat(step), low.floor()]
     })
+}
+
+/// Returns the record of a coordinate reference system that is known by its EPSG code: keys of
+/// GeoTIFF.
+fn keys((code, is_geographic): (u16, bool)) -> (&'static str, u16, Vec<u8>) {
+    let (model, key) = if is_geographic { (2, 2048) } else { (1, 3072) };
+    // A head, then the kind of system, pixels that are areas, and the code.
+    let numbers = [[1, 1, 0, 3], [1024, 0, 1, model], [1025, 0, 1, 1], [key, 0, 1, code]];
+    (
+        "LASF_Projection",
+        34735,
+        numbers.as_flattened().iter().flat_map(|n: &u16| n.to_le_bytes()).collect(),
+    )
 }
 
 /// Returns the records of a file's coordinate reference system; none for files of other formats.

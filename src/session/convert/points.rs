@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Error, Result,
     about::About,
-    edit::{self, Context, Edit, Editable, Pass, Surface},
+    edit::{self, Context, Crs, Edit, Editable, Pass, Surface},
     formats::{
         Attribute, Kind, NumberType, PointLayout, PointWriter, Records, Stream, write_points,
     },
@@ -42,7 +42,8 @@ impl<W: Watch> Work<'_, W> {
             has_colors,
             bounds: pass.bounds(),
             grid: pass.grid(),
-            crs: pass.first().map(Path::to_owned),
+            crs: pass.first().map(Path::to_owned).filter(|_| pass.crs().is_none()),
+            code: pass.crs().and_then(code_of),
             attributes: attributes.clone(),
         };
         let mut writer = write_points(self.output, layout)?;
@@ -75,7 +76,15 @@ impl<W: Watch> Work<'_, W> {
             self.edit_surface(&mut surface, path)?;
             parts.push(surface.into_records());
         }
-        let layout = layout_of(&parts);
+        let mut layout = layout_of(&parts);
+        let crs = self.conversion.edits.iter().rev().find_map(|edit| match edit {
+            Edit::Reproject(reprojection) => Some(&reprojection.to),
+            _ => None,
+        });
+        layout.code = crs.and_then(code_of);
+        if crs.is_some_and(Crs::is_geographic) {
+            layout.grid = Some(edit::grid_of_degrees(layout.bounds));
+        }
         let attributes = layout.attributes.clone();
         let mut writer = write_points(self.output, layout)?;
         let attributes = names_of(&attributes, &*writer);
@@ -104,13 +113,13 @@ impl<W: Watch> Work<'_, W> {
         }
         let Some(first) = streams.first() else { return Ok(None) };
         let frame = Frame::of(first.orientation(), || first.guess_orientation())?;
-        let context = self.context(&self.files[0], frame.up(self.conversion.up));
+        let context = self.context(&self.files[0], frame.up(self.conversion.up), first.crs());
         self.watch.has_read(self.files)?;
         Ok(Some(Pass::new(streams, &self.conversion.edits, context, names, watch)?))
     }
 
-    fn context(&self, file: &Path, up: DVec3) -> Context {
-        Context { file: file.to_owned(), up, memory: self.conversion.most_memory() }
+    fn context(&self, file: &Path, up: DVec3, crs: String) -> Context {
+        Context { file: file.to_owned(), up, memory: self.conversion.most_memory(), crs }
     }
 
     /// Returns the splats of points that are edited while they are read; `None` if there are no
@@ -194,6 +203,7 @@ impl<W: Watch> Work<'_, W> {
             bounds: pass.bounds(),
             grid: None,
             crs: None,
+            code: None,
         };
         let mut scratch = crate::formats::ply::PointFile::scratch(self.output, layout)?;
         let changes =
@@ -257,17 +267,22 @@ impl<W: Watch> Work<'_, W> {
     fn edit_surface(&self, surface: &mut Surface, path: &Path) -> Result<(), W::Error> {
         let mesh = &surface.mesh;
         let frame = Frame::of(mesh.about.orientation, || Ok(mesh.guess_orientation()))?;
-        self.edit(surface, path, frame.up(self.conversion.up))
+        let crs = mesh.about.crs.clone();
+        let context = self.context(path, frame.up(self.conversion.up), crs);
+        self.edit_in(surface, &context)
     }
 
     /// Makes the edits of a scene that is in memory.
     pub fn edit<S: Editable>(&self, scene: &mut S, path: &Path, up: DVec3) -> Result<(), W::Error> {
+        self.edit_in(scene, &self.context(path, up, String::new()))
+    }
+
+    fn edit_in<S: Editable>(&self, scene: &mut S, context: &Context) -> Result<(), W::Error> {
         if self.conversion.edits.is_empty() {
             return Ok(());
         }
-        self.watch.stage(&format!("Editing {}", path.display()));
-        let context = self.context(path, up);
-        self.watch.has_edited(&edit::apply(scene, &self.conversion.edits, &context)?);
+        self.watch.stage(&format!("Editing {}", context.file.display()));
+        self.watch.has_edited(&edit::apply(scene, &self.conversion.edits, context)?);
         Ok(())
     }
 
@@ -300,6 +315,11 @@ impl<W: Watch> Watch for Inner<'_, W> {
     fn has_colored(&self, is_mesh: bool, has_values: bool) -> Result<(), W::Error> {
         self.0.has_colored(is_mesh, has_values)
     }
+}
+
+/// Returns the code of a reference system, if it has one, and whether it is geographic.
+fn code_of(crs: &Crs) -> Option<(u16, bool)> {
+    Some((crs.code()?, crs.is_geographic()))
 }
 
 /// Returns the names of the attributes that a file keeps.

@@ -4,12 +4,14 @@ use super::{Description, InputEntry, PictureEntry, TransferEntry};
 use crate::{
     Error, Result,
     about::About,
+    edit::Edit,
     formats::{Kind, Times},
     math::Camera,
     memory,
     scene::{Item, Scene, Settings},
     session::{
-        Captions, CellStyle, Data, Drawing, Facts, Framing, Items, Name, Showing, Subject, Surfaces,
+        Captions, CellStyle, Data, Drawing, EditedInput, Facts, Framing, Items, Name, Opened,
+        Showing, Subject, Surfaces,
     },
     warning,
 };
@@ -237,9 +239,44 @@ impl Description {
         }
         opened.give_radii(&mut data, showing.point_radius.as_deref())?;
         input.transform.apply(path, &mut data)?;
+        if !input.edits.is_empty() {
+            data = self.edited(input, (&opened, data), &[])?.into_data();
+        }
         let (is_raw, files, facts) = (opened.is_raw(), opened.files(), opened.cheap_facts(&data)?);
         let times = opened.times();
         Ok(ReadInput { data, showing, is_raw, files, times, facts })
+    }
+}
+
+impl Description {
+    /// Reads a mesh, a point cloud or trained Gaussians with the values of these names, where the
+    /// description moves them to and as it edits them: to see what edits would change.
+    ///
+    /// # Errors
+    /// Those of [`read_input`](Self::read_input); [`Error::Input`] for an input of another kind.
+    pub fn read_editable(&self, input: &InputEntry, names: &[&str]) -> Result<EditedInput> {
+        let showing = self.showing(input)?;
+        let reading = self.reading_of(input).reading_within(memory::most());
+        let attribute = showing.coloring().attribute();
+        let opened = reading.open_colored(&input.file, attribute)?;
+        let mut data = opened.read()?;
+        input.transform.apply(&input.file, &mut data)?;
+        self.edited(input, (&opened, data), names)
+    }
+
+    /// Edits what was read of an input. What is left has the values of these names.
+    fn edited(
+        &self,
+        input: &InputEntry,
+        (opened, data): (&Opened, Data),
+        names: &[&str],
+    ) -> Result<EditedInput> {
+        let edits: Vec<Edit> = input.edits.iter().map(|entry| entry.edit().clone()).collect();
+        let of_edits = edits.iter().filter_map(Edit::names).flatten();
+        let names: Vec<&str> = of_edits.chain(names.iter().copied()).collect();
+        let mut edited = EditedInput::new(opened, data, &names, self.framing.up)?;
+        edited.apply(&edits)?;
+        Ok(edited)
     }
 }
 

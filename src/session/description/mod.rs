@@ -9,6 +9,7 @@ mod appearance;
 mod camera;
 mod clip;
 mod color;
+mod edit;
 mod file;
 mod kernel_file;
 mod length;
@@ -27,6 +28,7 @@ pub use appearance::{
 pub use camera::CameraEntry;
 pub use clip::{Axis, ClipEntry, ClipSide, Place};
 pub use color::{Background, ColorEntry};
+pub use edit::EditEntry;
 pub use length::PaperLength;
 pub use light::LightName;
 pub use load::{Loaded, LoadedInput, ReadInput};
@@ -87,6 +89,9 @@ pub struct InputEntry {
     /// Where it is moved to.
     #[serde(default, skip_serializing_if = "is_default")]
     pub transform: TransformEntry,
+    /// What is changed once it is moved, in this order.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub edits: Vec<EditEntry>,
     /// How it is shown.
     #[serde(default, skip_serializing_if = "is_default")]
     pub appearance: AppearanceEntry,
@@ -167,7 +172,7 @@ impl InputEntry {
     /// A visible input with nothing else set.
     pub fn new(file: PathBuf) -> Self {
         let (reading, transform, appearance) = Default::default();
-        Self { file, visible: true, reading, transform, appearance }
+        Self { file, visible: true, reading, transform, edits: Vec::new(), appearance }
     }
 }
 

@@ -3,11 +3,13 @@
 use super::*;
 use crate::{
     Error,
+    input::testing::Folder,
     math::{Camera, Projection},
     scene::{Classification, Optics, Settings},
     volume::TransferFunction,
 };
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// A scene that sets a field of every part.
 fn scene() -> Description {
@@ -314,4 +316,44 @@ fn another_time_looks_as_the_first_does() {
     // And back again.
     let again = later.at_time(&other, 0).load(&|_| ()).expect("the first time");
     assert_eq!(parts(&again), (first, transfer));
+}
+
+/// Edits are made once an input is moved, and what they leave has the values that colour it.
+#[test]
+fn inputs_are_edited_before_they_are_drawn() {
+    let text = r#"{"splatkit_scene": 2, "inputs": [
+        {"file": "a.csv", "transform": {"translate": [10, 0, 0]},
+         "edits": ["where:heat > 1 && x < 13", "crop:11,-1,-1,99,1,1"],
+         "appearance": {"color": "heat"}}]}"#;
+    let scene = Description::parse(text).unwrap();
+    let rows = (0..6).map(|at| format!("{at},0,0,{at}\n")).collect::<String>();
+    let files = |name: &str, bytes: &[u8]| BTreeMap::from([(name.into(), bytes.to_vec())]);
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n\
+         property float z\nproperty float heat\nend_header\n{}",
+        rows.replace(',', " ")
+    );
+    let mut edited = scene.clone();
+    edited.inputs[0].file = "a.ply".into();
+    let loaded = edited.load_held(&files("a.ply", ply.as_bytes()), &|_| {}).unwrap();
+    assert_eq!(loaded.inputs[0].facts.to_json()["count"], 1);
+    let [low, high] = [loaded.subject.bounds.min, loaded.subject.bounds.max];
+    assert!(low.x > 11.0 && high.x < 13.0, "{low} {high}");
+    // Edits are for what has points of its own.
+    let volume = crate::volume::phantoms::Phantom::Ball.sample([4; 3]).unwrap();
+    let mut field = scene;
+    (field.inputs[0].file, field.inputs[0].transform) = ("v.nrrd".into(), Default::default());
+    field.inputs[0].appearance = AppearanceEntry::default();
+    let folder = Folder::new();
+    let path = folder.path("v.nrrd");
+    crate::formats::nrrd::write(&volume, &path).unwrap();
+    let bytes = std::fs::read(path).unwrap();
+    let error = field.load_held(&files("v.nrrd", &bytes), &|_| {}).err().unwrap();
+    let message = error.to_string();
+    for word in ["v.nrrd", "edits", "a volume cannot be edited"] {
+        assert!(message.contains(word), "{message}");
+    }
+    let bad = text.replace("crop:11", "crops:11");
+    let message = Description::parse(&bad).unwrap_err().to_string();
+    assert!(message.contains("there is no edit “crops”"), "{message}");
 }

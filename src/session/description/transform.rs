@@ -4,6 +4,7 @@ use super::Axis;
 use crate::{
     Error, Result,
     about::{About, Orientation},
+    edit::Motion,
     parallel::prelude::*,
     session::Data,
 };
@@ -90,6 +91,20 @@ impl TransformEntry {
     /// [`Error::Argument`] with the name of the field that is wrong.
     pub fn validate(&self) -> Result<()> {
         self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
+    /// Returns the motion; `None` if nothing is moved.
+    pub fn motion(&self) -> Option<Motion> {
+        let by = (*self != Self::default()).then(|| self.similarity())?;
+        let rows = (by.rotation * by.scale).transpose();
+        let row = |axis: DVec3, shift: f64| [axis.x, axis.y, axis.z, shift];
+        let rows = [
+            row(rows.x_axis, by.translation.x),
+            row(rows.y_axis, by.translation.y),
+            row(rows.z_axis, by.translation.z),
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        Motion::matrix(rows.as_flattened().try_into().ok()?).ok()
     }
 
     fn similarity(&self) -> Similarity {

@@ -24,8 +24,8 @@ use splatkit::{
     scattered::Points,
     scene::Optics,
     session::{
-        AppearanceEntry, CameraEntry, Data, Description, Engine, Framing, InputEntry, Layer, Name,
-        OverlayEntry, PictureEntry, ReadingEntry, TransformEntry,
+        AppearanceEntry, CameraEntry, Data, Description, EditEntry, Engine, Framing, InputEntry,
+        Layer, Name, OverlayEntry, PictureEntry, ReadingEntry, TransformEntry,
     },
     surface::Mesh,
     volume::{Arrangement, Lattice, Volume},
@@ -73,6 +73,8 @@ struct ArrayFacts {
 struct FileFacts {
     /// Where the item is moved to.
     transform: TransformEntry,
+    /// What is changed before it is drawn.
+    edits: Vec<EditEntry>,
     /// What pictures compute of fields. Other optics than light show values alone: of a volume that
     /// has colours its brightness, and of cells the field inside.
     optics: Option<Optics>,
@@ -428,7 +430,8 @@ impl Scene {
         let worker_stop = stop.clone();
         run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
-            let input = InputEntry { transform: facts.transform, ..InputEntry::new(path) };
+            let FileFacts { transform, edits, .. } = facts;
+            let input = InputEntry { transform, edits, ..InputEntry::new(path) };
             let mut scene = Description::new([]);
             (scene.reading, scene.appearance) = (load.begun(), appearance);
             scene.picture.optics = facts.optics;
@@ -656,6 +659,7 @@ pub fn read_scene(py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<S
                 "file": input.file,
                 "reading": scene.reading_of(input),
                 "transform": input.transform,
+                "edits": input.edits,
                 "appearance": scene.appearance_of(input),
             })
         };
@@ -687,15 +691,16 @@ struct Described {
 pub fn write_scene(
     py: Python<'_>,
     path: PathBuf,
-    inputs: Vec<(PathBuf, String, String, String)>,
+    inputs: Vec<(PathBuf, String, String, String, String)>,
     described: &str,
 ) -> PyResult<()> {
     let made = || -> Result<Description, Error> {
         let mut scene = Description::new([]);
-        for (file, load, appearance, transform) in inputs {
+        for (file, load, appearance, transform, edits) in inputs {
             let (reading, appearance) = (reading(&load)?, self::appearance(&appearance)?);
-            let (transform, new) = (options(&transform)?, InputEntry::new(file));
-            scene.inputs.push(InputEntry { reading, appearance, transform, ..new });
+            let (transform, edits) = (options(&transform)?, options(&edits)?);
+            let new = InputEntry::new(file);
+            scene.inputs.push(InputEntry { reading, appearance, transform, edits, ..new });
         }
         let Described { camera, framing, picture, overlay, engine } = options(described)?;
         (scene.camera, scene.framing) = (camera, framing);

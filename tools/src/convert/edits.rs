@@ -3,7 +3,7 @@
 use crate::parse;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use glam::DVec3;
-use splatkit::edit::{Edit, Expression, Motion, Region, Thin};
+use splatkit::edit::{Crs, Edit, Expression, Motion, Region, Reprojection, Thin};
 
 /// Edits of meshes, point clouds, hierarchies and trained Gaussians.
 #[derive(Args, Debug)]
@@ -37,6 +37,14 @@ struct Flags {
     /// Move everything by a matrix: 16 numbers with commas, row by row; the last row is 0,0,0,1.
     #[arg(long, value_name = "NUMBERS", value_parser = matrix, allow_hyphen_values = true)]
     matrix: Vec<Motion>,
+    /// Give points and meshes the coordinates of another reference system, EPSG:25832 or a PROJ
+    /// string such as '+proj=utm +zone=32 +ellps=GRS80'. Heights stay. Geographic systems have
+    /// longitudes and latitudes in degrees.
+    #[arg(long, value_name = "CRS")]
+    reproject: Vec<Crs>,
+    /// The coordinate reference system of the inputs, for --reproject, instead of what they say.
+    #[arg(long, value_name = "CRS", requires = "reproject")]
+    from_crs: Option<Crs>,
     /// Keep points that are no nearer to each other than a distance in world units, such as 0.05; a
     /// share of them, such as 10%; or this many, such as 100000pts. Trained Gaussians and the
     /// splats of hierarchies are merged: those narrower than the distance, or to this share or
@@ -77,6 +85,9 @@ impl FromArgMatches for EditFlags {
         add("rotate", moves(flags.rotate));
         add("scale", moves(flags.scale.into_iter().map(Motion::scale).collect()));
         add("matrix", moves(flags.matrix));
+        let systems = flags.reproject.into_iter();
+        let named = |to| Edit::Reproject(Reprojection { from: None, to });
+        add("reproject", systems.map(named).collect());
         add("thin", flags.thin.into_iter().map(Edit::Thin).collect());
         let counts = flags.keep_cluster.into_iter();
         add("keep_cluster", counts.map(|count| Edit::KeepCluster(count as usize)).collect());
@@ -86,7 +97,16 @@ impl FromArgMatches for EditFlags {
         );
         add("normals", flags.normals.then_some(Edit::Normals).into_iter().collect());
         placed.sort_by_key(|(place, _)| *place);
-        Ok(Self(placed.into_iter().map(|(_, edit)| edit).collect()))
+        let mut edits: Vec<Edit> = placed.into_iter().map(|(_, edit)| edit).collect();
+        // The next one begins where this one ends.
+        let first = edits.iter_mut().find_map(|edit| match edit {
+            Edit::Reproject(reprojection) => Some(reprojection),
+            _ => None,
+        });
+        if let Some(first) = first {
+            first.from = flags.from_crs;
+        }
+        Ok(Self(edits))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -160,6 +180,8 @@ mod tests {
             ("--thin|0", "100000pts"),
             ("--matrix|1,2,3", "16 numbers"),
             ("--keep-cluster|0", "keep-cluster"),
+            ("--reproject|EPSG:64999", "PDAL"),
+            ("--from-crs|EPSG:4326", "--reproject"),
         ] {
             let message = parsed(text).unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");

@@ -4,6 +4,7 @@ use crate::{failure::Failure, job::Loaded, progress::Progress};
 use splatkit::{
     Device, Error,
     compare::compare_pictures,
+    edit::Edit,
     formats::{self, Format, Kind},
     input::{Limits, is_remote},
     scene::Item,
@@ -84,6 +85,8 @@ fn is_read_by_viewer(read: &LoadedInput, entry: &InputEntry) -> bool {
     };
     has_reader
         && entry.reading.labels.is_none()
+        // Pages have no projections.
+        && !entry.edits.iter().any(|entry| matches!(entry.edit(), Edit::Reproject(_)))
         && !read.files.iter().any(is_remote)
         // The viewer has no files beside an input.
         && read.files.iter().all(|file| *file == read.file)
@@ -118,9 +121,10 @@ fn converted_entries(
     files: &mut BTreeMap<String, Vec<u8>>,
 ) -> Result<Vec<InputEntry>, Failure> {
     let ReadInput { data, .. } = scene.read_input(input)?;
-    // The converted file has one array, is where the input was moved to, and knows its own layout.
+    // The converted file has one array, is as the input was moved and edited, and knows its own
+    // layout.
     entry.reading = ReadingEntry::default();
-    entry.transform = Default::default();
+    (entry.transform, entry.edits) = Default::default();
     let mut add =
         |mut entry: InputEntry, transfer: Option<TransferFunction>, name: &str, data: &Data| {
             let (name, bytes) = converted(scene, input, name, data)?;
@@ -219,7 +223,9 @@ fn converted(
 /// Writes the hierarchy of a mesh.
 fn hierarchy(scene: &Description, input: &InputEntry, path: &Path) -> Result<(), Error> {
     let appearance = scene.appearance_of(input);
+    let edits = input.edits.iter().map(|entry| entry.edit().clone());
     let conversion = Conversion {
+        edits: input.transform.motion().map(Edit::Move).into_iter().chain(edits).collect(),
         reading: scene.reading_of(input).reading(),
         coloring: appearance.coloring(),
         radius_scale: appearance.radius_scale.unwrap_or(1.0),

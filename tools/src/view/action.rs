@@ -1,5 +1,6 @@
 //! What a user asks for. Panels, keys and the hand return actions; the window applies them.
 
+use super::selection::{Mode, Tool};
 use eframe::egui::{ThemePreference, Vec2};
 use glam::{DVec2, DVec3};
 use splatkit::{
@@ -43,6 +44,8 @@ pub enum Action {
     View(Option<Side>),
     /// Show or hide a part of the window.
     Toggle(Part),
+    /// Change what is selected, or do something with it.
+    Select(Select),
     /// Begin or end measuring.
     Measure,
     /// Measure from or to a point, in world units.
@@ -77,6 +80,29 @@ impl Action {
     pub fn drag(change: impl FnOnce(&mut Description) + 'static) -> Self {
         Self::Drag(Box::new(change))
     }
+}
+
+/// A change of what is selected.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Select {
+    /// Draw outlines with this, or turn the scene again.
+    Tool(Option<Tool>),
+    /// What becomes of the selection before.
+    Mode(Mode),
+    /// Whether outlines select no deeper than what is seen in them.
+    Near(bool),
+    /// Select what an outline holds, by its corners in pixels of the picture.
+    Outline(Vec<DVec2>),
+    /// Select what meets a condition.
+    Condition(String),
+    /// Select everything else.
+    Invert,
+    /// Select nothing, and turn the scene again.
+    Clear,
+    /// Delete what is selected.
+    Delete,
+    /// Delete everything else.
+    Keep,
 }
 
 /// A part of the window that can be hidden.
@@ -144,6 +170,8 @@ pub enum Purpose {
     OpenPath,
     SavePath,
     Export,
+    /// An input as it is edited, by its number.
+    SaveEdited(usize),
 }
 
 impl Purpose {
@@ -159,6 +187,7 @@ impl Purpose {
             Self::OpenPath => "Open a path of the camera",
             Self::SavePath => "Save the path of the camera",
             Self::Export => "Export a film",
+            Self::SaveEdited(_) => "Save the edited input",
         }
     }
 
@@ -172,6 +201,7 @@ impl Purpose {
             Self::SaveTransfer => Some("transfer.json"),
             Self::SavePath => Some("path.json"),
             Self::Export => Some("film.webp"),
+            Self::SaveEdited(_) => Some("edited.ply"),
         }
     }
 
@@ -181,6 +211,9 @@ impl Purpose {
             Self::Open => &[],
             Self::SavePicture | Self::SaveFigure => {
                 &["png", "jpg", "jpeg", "tiff", "tif", "webp", "exr"]
+            }
+            Self::SaveEdited(_) => {
+                &["ply", "las", "laz", "e57", "spz", "sog", "splat", "glb", "splk"]
             }
             Self::Export => &["webp", "gif", "apng", "mp4", "webm", "mov", "png"],
             _ => &["json"],

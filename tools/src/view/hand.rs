@@ -1,12 +1,13 @@
 //! The picture, and what a hand does in it.
 
 use super::{
-    action::{Action, Motion},
+    action::{Action, Motion, Select},
     canvas::Canvas,
-    handles,
+    handles, outline,
     painter::Frame,
     scene_view::SceneView,
     screen::Screen,
+    selection::{Selected, Tool},
 };
 use eframe::egui::{
     self, Align2, Color32, CursorIcon, FontId, PointerButton, Pos2, Rect, Response, Role, Sense,
@@ -28,6 +29,9 @@ pub struct Picture<'a> {
     /// Whether clicks measure, and the points that were picked, in world units.
     pub measures: bool,
     pub measured: &'a [DVec3],
+    /// What outlines are drawn with, instead of turning the scene.
+    pub tool: Option<Tool>,
+    pub selected: Option<&'a Selected>,
     pub clips: &'a [ClipEntry],
     /// Whether clips have handles.
     pub has_handles: bool,
@@ -39,6 +43,8 @@ pub struct Picture<'a> {
 pub struct Hand {
     /// The depth of the point where a drag began.
     grabbed: Option<f64>,
+    /// The outline that is being drawn, in points of the screen.
+    outline: Vec<Pos2>,
     /// The world point under the cursor.
     pub under_cursor: Option<DVec3>,
 }
@@ -62,6 +68,15 @@ pub fn show(ui: &mut Ui, picture: &Picture, hand: &mut Hand) -> ([u32; 2], Vec<A
             let screen = Screen { view, area, scale };
             measured(ui, &screen, picture.measured, &scene_view.stage.loaded.captions.length);
             clips(ui, &screen, picture, scene_view, &mut actions);
+            if let Some(selected) = picture.selected {
+                outline::mark(ui, &screen, picture.frame, selected);
+            }
+            if let Some(tool) = picture.tool
+                && let Some(corners) = outline::draw(ui, &response, tool, &mut hand.outline)
+            {
+                let corners = corners.into_iter().map(|corner| touch.pixel(corner)).collect();
+                actions.push(Action::Select(Select::Outline(corners)));
+            }
         }
     } else if !picture.is_loading {
         let hint = "Drop a scan, a volume or a scene here, or open one (Ctrl+O)";
@@ -110,7 +125,7 @@ impl Touch<'_> {
             actions.push(Action::Level(Vec2::new(drag.x, drag.y)));
         } else if by(PointerButton::Primary) && modifiers.alt {
             actions.push(Action::Move(Motion::LookAround(moved)));
-        } else if by(PointerButton::Primary) {
+        } else if by(PointerButton::Primary) && self.picture.tool.is_none() {
             actions.push(Action::Move(Motion::Turn(moved)));
         }
     }

@@ -1,6 +1,9 @@
 //! What keys ask for.
 
-use super::action::{Action, Motion, Part, Purpose};
+use super::{
+    action::{Action, Motion, Part, Purpose, Select},
+    selection::Tool,
+};
 use eframe::egui::{Key, Modifiers, Ui};
 use glam::DVec3;
 use splatkit::session::Side;
@@ -29,6 +32,11 @@ pub fn take(ui: &Ui) -> Vec<Action> {
         (command, Key::Q, Action::Quit),
         (Modifiers::NONE, Key::F11, Action::FullScreen),
         (Modifiers::NONE, Key::M, Action::Measure),
+        (command, Key::I, Action::Select(Select::Invert)),
+        (Modifiers::NONE, Key::B, Action::Select(Select::Tool(Some(Tool::Box)))),
+        (Modifiers::NONE, Key::L, Action::Select(Select::Tool(Some(Tool::Lasso)))),
+        (Modifiers::NONE, Key::Delete, Action::Select(Select::Delete)),
+        (Modifiers::NONE, Key::Escape, Action::Select(Select::Clear)),
         (Modifiers::NONE, Key::F1, Action::Toggle(Part::Help)),
         (Modifiers::NONE, Key::H, Action::Toggle(Part::Help)),
         (Modifiers::NONE, Key::Tab, Action::Toggle(Part::Side)),

@@ -19,11 +19,14 @@ mod hand;
 mod handles;
 mod keys;
 mod loader;
+mod outline;
 mod painter;
 mod panels;
 mod recent;
+mod saving;
 mod scene_view;
 mod screen;
+mod selection;
 mod slices;
 #[cfg(test)]
 mod tests;

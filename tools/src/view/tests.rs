@@ -1,5 +1,6 @@
 //! The window without a screen: it is driven by events, and draws on the CPU engine.
 
+mod selection;
 mod tasks;
 
 use super::{
@@ -61,6 +62,17 @@ fn rest(harness: &mut Harness<'static, Option<Window>>) {
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     panic!("no exact picture; messages: {:?}", window(harness).messages);
+}
+
+/// Returns the scene that `splatkit render` draws with these words.
+fn scene_of_words(words: &[String]) -> Description {
+    let command = ["splatkit".to_owned(), "render".to_owned()];
+    let words = command.iter().chain(words);
+    let matches = Command::command().try_get_matches_from(words).expect("flags");
+    let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task else {
+        panic!("another task");
+    };
+    render.job(&Given::of(&matches)).expect("a job").scene
 }
 
 /// Opens a part of the side panel.

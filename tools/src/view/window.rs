@@ -3,6 +3,7 @@
 mod apply;
 mod drawing;
 mod files;
+mod select;
 mod side;
 
 use super::{
@@ -19,7 +20,9 @@ use super::{
     painter::{Frame, Painter},
     panels::{flight::Player, menu},
     recent::Recent,
+    saving::Saving,
     scene_view::SceneView,
+    selection::Selection,
     slices::SlicePanes,
 };
 use eframe::{
@@ -66,6 +69,9 @@ pub struct Window {
     /// Whether clicks measure, and the points that were picked, in world units.
     pub measures: bool,
     pub measured: Vec<DVec3>,
+    pub selection: Selection,
+    /// The edited input that is being written.
+    pub saving: Option<Saving>,
     /// The last frame.
     pub frame: Option<Frame>,
     canvas: Canvas,
@@ -114,6 +120,8 @@ impl Window {
             scene_view: None,
             measures: false,
             measured: Vec::new(),
+            selection: Selection::default(),
+            saving: None,
             frame: None,
             canvas: Canvas::new(state),
             delay: 0.0,
@@ -193,6 +201,7 @@ impl Window {
             self.say(message, true);
         }
         self.take_film();
+        self.take_selected();
         self.save_if_exact();
         let title = self.document.title();
         if title != self.title {
@@ -207,7 +216,8 @@ impl Window {
             .frame
             .as_ref()
             .is_some_and(|frame| frame.is_exact() && frame.number == self.last_order);
-        self.loading.is_none() && (self.scene_view.is_none() || is_exact)
+        let is_busy = self.loading.is_some() || self.selection.finding.is_some();
+        !is_busy && (self.scene_view.is_none() || is_exact)
     }
 
     pub fn say(&mut self, text: impl Into<String>, is_error: bool) {
@@ -272,6 +282,8 @@ impl Window {
             frame: self.frame.as_ref(),
             measures: self.measures,
             measured: &self.measured,
+            tool: self.selection.tool,
+            selected: self.selection.selected.as_ref(),
             clips: &self.document.scene().picture.clips,
             has_handles: self.parts.handles,
             is_loading: self.loading.is_some(),

@@ -59,6 +59,7 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
         let file = file_of(&input.file).to_string_lossy().into_owned();
         let given = values.into_iter().filter_map(|(name, value)| Some((name, value?)));
         words.extend(given.map(|(name, value)| format!("--{name}={file}={value}")));
+        words.extend(input.edits.iter().map(|edit| format!("--edit={file}={edit}")));
         words.push(file);
     }
     Ok(words)
@@ -225,6 +226,7 @@ mod tests {
             "--radius 0.4 --neighbours 9 --no-slopes",
             "--scale 0.001 --rotate b.ply=z:90 --translate a.nrrd=-1,0.5,1e-7 --translate 4,5,6",
             "--rotate -1,0.3,0:-12.25",
+            "--edit where:x>3&&x!=5 --edit a.nrrd=crop:sphere:0,0,0,1 --edit remove-floaters",
         ] {
             let words: Vec<String> = ["a.nrrd", "b.ply"]
                 .into_iter()

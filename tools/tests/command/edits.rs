@@ -131,6 +131,56 @@ fn edits_of_more_than_memory_are_the_same() {
     assert_eq!(names, ["a.ply", "a.splk", "b.splk"]);
 }
 
+/// Degrees are written as finely as metres, and the file says its new system.
+#[test]
+fn points_get_another_reference_system_and_their_own_back() {
+    let folder = Folder::new();
+    folder.put("a.ply", cloud());
+    folder
+        .run(
+            "convert a.ply -o there.laz --translate 565000,5934000,0 --reproject EPSG:4326 \
+             --from-crs EPSG:25832",
+        )
+        .ok();
+    let there = folder.json("info there.laz --json");
+    assert_eq!(there["crs"], "EPSG:4326", "{there}");
+    let low: Vec<f64> = serde_json::from_value(there["bounds"]["min"].clone()).unwrap();
+    // The corner of the cloud, from pyproj; z stays.
+    for (at, wanted) in low.iter().zip([9.981_100_311, 53.550_862_883, 0.0]) {
+        assert!((at - wanted).abs() < 1e-5, "{low:?}");
+    }
+    folder
+        .run("convert there.laz -o back.las --reproject EPSG:25832 --translate -565000,-5934000,0")
+        .ok();
+    assert_eq!(folder.json("info back.las --json")["crs"], "EPSG:25832");
+    let compared = folder.json("compare a.ply back.las --json");
+    for way in [0, 1] {
+        let farthest = compared["distances"][way]["largest"].as_f64().unwrap();
+        assert!(farthest < 0.002, "{compared}");
+    }
+    // Splats have shapes that no map keeps.
+    folder.run("convert a.ply -o g.ply").ok();
+    folder
+        .run("convert g.ply -o h.ply --reproject EPSG:4326 --from-crs EPSG:25832")
+        .fails(2, &["--reproject is for points and meshes"]);
+    assert!(!folder.path("h.ply").exists());
+}
+
+/// A picture of edited inputs is that of the file that convert writes with the same edits.
+#[test]
+fn edited_pictures_are_those_of_edited_files() {
+    let folder = Folder::new();
+    folder.put("a.ply", cloud());
+    let edits = "--edit where:x>9&&z<1 --edit a.ply=crop:xy:0,0,30,0,30,30,0,30";
+    // Greys of intensities are spread over all points of a file.
+    let view = "--size 64x48 --engine cpu --up +Z --view top --color orange";
+    folder.run(&format!("render a.ply -o a.png {edits} {view}")).ok();
+    folder.run("convert a.ply -o b.points.ply --where x>9&&z<1 --crop xy:0,0,30,0,30,30,0,30").ok();
+    folder.run(&format!("render b.points.ply -o b.png {view}")).ok();
+    let [a, b] = ["a.png", "b.png"].map(|name| std::fs::read(folder.path(name)).unwrap());
+    assert!(is_png(&a, 64, 48) && a == b, "the pictures differ");
+}
+
 #[test]
 fn what_cannot_be_edited_is_told() {
     let folder = Folder::new();

@@ -305,6 +305,30 @@ const USES: &[(&str, &str, i32, &str)] = &[
         3,
         "--crop: keeps none of 4",
     ),
+    (
+        "an edit of a picture that leaves nothing",
+        "render a.ply -o out.png --edit where:x>99",
+        3,
+        "--where: keeps none of 4",
+    ),
+    (
+        "an edit that there is not",
+        "render a.ply -o out.png --edit grow:2",
+        2,
+        "there is no edit “grow”",
+    ),
+    (
+        "a reference system that is not known",
+        "convert a.ply -o out.las --reproject EPSG:64999",
+        2,
+        "EPSG:64999 is not known here",
+    ),
+    (
+        "another reference system for a file that does not say its own",
+        "convert a.ply -o out.las --reproject EPSG:4326",
+        3,
+        "does not say its coordinate reference system",
+    ),
 ];
 
 fn folder() -> Folder {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
@@ -129,7 +129,8 @@ def convert(
         range: The values that the colours are spread over.
         edits: What is changed on the way, in this order: names of the command's flags with their
             values, such as ("where", "classification == 2"), ("thin", 0.5),
-            ("translate", (1, 2, 3)) or ("remove-floaters", "").
+            ("translate", (1, 2, 3)), ("reproject", "EPSG:25832 to EPSG:4326") or
+            ("remove-floaters", "").
         reading: How files are read: the options of reading of `Scene.add`.
     """
     given = _options.checked(reading, _options.READING, "convert")
@@ -146,7 +147,7 @@ def convert(
         "radius_scale": radius_scale,
         "lattice": lattice,
         "memory": memory,
-        "edits": [(name, _edit(value)) for name, value in edits],
+        "edits": [(name, _options.edit(value)) for name, value in edits],
     }
     appearance = {"color": color, "colormap": colormap, "range": range}
     _pysplatkit.convert(
@@ -157,15 +158,6 @@ def convert(
         _options.appearance(appearance),
     )
     return Path(output)
-
-
-def _edit(value: object) -> str:
-    """Returns the value of an edit as the command's flag has it."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Iterable):
-        return ",".join(str(float(part)) for part in value)
-    return str(value)
 
 
 class Leaves(NamedTuple):

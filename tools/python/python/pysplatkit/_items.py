@@ -79,11 +79,12 @@ class Item:
         return replace(self, arguments={**self.arguments, **paths})
 
     @property
-    def input(self) -> tuple[str, str, str, str] | None:
-        """The path, and as JSON how the file is read, shown and moved; None for an array."""
+    def input(self) -> tuple[str, str, str, str, str] | None:
+        """The path, and as JSON how the file is read, shown, moved and edited; None for an array."""
         if self.method != "add":
             return None
-        return self.arguments["source"], *_file_options(self.arguments), self.transform
+        edits = _values.text(self.arguments.get("edits", []))
+        return self.arguments["source"], *_file_options(self.arguments), self.transform, edits
 
 
 #: Options that change which values are shown.
@@ -113,9 +114,11 @@ def unused(name: str, names: Sequence[str]) -> str:
 def _plain_file(given: Arguments) -> Arguments:
     source = os.fspath(given.pop("source"))
     hidden = {name: given.pop(name, None) for name in ("_reading", "_appearance", "_optics")}
-    known = _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING
+    known = _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING | {"edits"}
     options = _options.checked(given, known, "add")
     options.update(_options.plain_appearance(options))
+    if "edits" in options:
+        options["edits"] = _options.edits(options["edits"])
     return {"source": source, **hidden, **options}
 
 
@@ -130,6 +133,7 @@ def _file_options(arguments: Mapping[str, Any]) -> tuple[str, str]:
 def _put_file(native: _pysplatkit.Scene, item: Item) -> None:
     facts = {"transform": json.loads(item.transform)}
     facts["optics"] = item.arguments.get("_optics")
+    facts["edits"] = item.arguments.get("edits", [])
     path = item.arguments["source"]
     native.add_file(path, *_file_options(item.arguments), _values.text(facts))
 
@@ -469,7 +473,11 @@ SAID = {
 _SURFACE = _options.SURFACE | {"scalar", "normals", "colors", "values", "up"}
 #: What an item of each method can be changed by.
 _KNOWN: dict[str, frozenset[str]] = {
-    "add": _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING | {"source"},
+    "add": _options.VOLUME
+    | _options.SURFACE
+    | _options.CELLS
+    | _options.READING
+    | {"source", "edits"},
     "add_volume": _options.VOLUME
     | (frozenset(_VOLUME) - {"frame"})
     | {"array", "scalar", "copy", "channel_axis", "channel_names", "opacity_from"},

@@ -16,6 +16,9 @@ _NAMES = {
     "no-occlusion": "occlusion=False",
     "camera-position": "camera",
     "thin": "edits",
+    "edit": "edits",
+    "from-crs": "edits",
+    "reproject": "edits",
 }
 
 #: Flags that have no keyword. They stay as they are.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol, TypedDict, Union
 
 import numpy as np
@@ -164,6 +164,9 @@ class Reading(TypedDict, total=False):
 class FileOptions(VolumeAppearance, SurfaceAppearance, Reading, total=False):
     """How a file is read and shown."""
 
+    #: What is changed before it is drawn, as for `convert`, once it is moved: ("where", "z > 0"),
+    #: ("thin", "10%"), … For meshes, point clouds and trained Gaussians.
+    edits: Sequence[tuple[str, object]]
     #: Cells: solid, an opaque body with the field inside where clips cut it, or volume, the field
     #: by a transfer function. Default: solid, unless another option is one of fields.
     cells: str
@@ -474,6 +477,21 @@ def reading(options: Mapping[str, Any]) -> str:
     if given.get("spacing") is not None:
         given["spacing"] = vector(given["spacing"])
     return text(given)
+
+
+def edit(value: object) -> str:
+    """Returns the value of an edit as the command's flag has it."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Iterable):
+        return ",".join(str(float(part)) for part in value)
+    return str(value)
+
+
+def edits(given: Iterable[tuple[str, object] | str]) -> list[str]:
+    """Returns edits as a scene file has them: names and values with colons between them."""
+    named = (one if isinstance(one, str) else f"{one[0]}:{edit(one[1])}" for one in given)
+    return [text.removesuffix(":") for text in named]
 
 
 def fit(**given: Any) -> str:

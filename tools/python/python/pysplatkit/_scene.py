@@ -69,6 +69,8 @@ class Scene:
         for file in described.pop("inputs"):
             arguments = {"source": file["file"], "_optics": optics}
             arguments |= {"_reading": file["reading"], "_appearance": file["appearance"]}
+            if file["edits"]:
+                arguments["edits"] = file["edits"]
             name = scene._unused(None, _items.name_of(file["file"]))
             item = Item.of(name, "add", arguments)
             scene._append(replace(item, transform=json.dumps(file["transform"])))

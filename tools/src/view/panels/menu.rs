@@ -1,8 +1,9 @@
 //! The menu above the picture, the line below it, and the help.
 
 use crate::view::{
-    action::{Action, Part, Purpose},
+    action::{Action, Part, Purpose, Select},
     recent::is_missing,
+    selection::Tool,
 };
 use eframe::egui::{self, Color32, Grid, Ui};
 use glam::DVec3;
@@ -42,6 +43,15 @@ pub fn menu(ui: &mut Ui, model: &Menu) -> Vec<Action> {
             ui.add_enabled_ui(model.can_redo, |ui| {
                 entry(ui, "Redo (Ctrl+Y)", Action::Redo, &mut actions);
             });
+            ui.separator();
+            for (name, select) in [
+                ("Select by box (B)", Select::Tool(Some(Tool::Box))),
+                ("Select by lasso (L)", Select::Tool(Some(Tool::Lasso))),
+                ("Invert selection (Ctrl+I)", Select::Invert),
+                ("Delete selection (Delete)", Select::Delete),
+            ] {
+                entry(ui, name, Action::Select(select), &mut actions);
+            }
         });
         ui.menu_button("View", |ui| view(ui, model, &mut actions));
         if ui.selectable_label(model.measures, "Measure").clicked() {
@@ -200,6 +210,8 @@ const HELP: &[(&str, &str)] = &[
     ("0, Home", "corner; whole scene"),
     ("O", "perspective on or off"),
     ("M", "measure between two points"),
+    ("B, L", "select by a box or a lasso; Esc ends that"),
+    ("Ctrl+I, Delete", "select everything else; delete what is selected"),
     ("Tab", "panels"),
     ("F11", "full screen"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo"),

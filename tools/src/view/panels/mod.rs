@@ -7,6 +7,7 @@ pub mod frame;
 pub mod inputs;
 mod lists;
 pub mod menu;
+pub mod selection;
 pub mod transfer;
 
 use super::curve::plain;

@@ -38,8 +38,10 @@ impl Window {
             Action::Level(drag) => self.level(drag),
             Action::Move(motion) => self.move_camera(motion),
             Action::View(side) => self.look_from(side),
+            Action::Select(select) => self.select(select),
             Action::Measure => {
                 self.measures = !self.measures;
+                self.selection.tool = None;
                 self.measured.clear();
             }
             Action::Pick(point) => self.pick(point),
@@ -94,6 +96,7 @@ impl Window {
             Purpose::SavePath => self.save_path(&first),
             Purpose::Export => self.export_film(first),
             Purpose::SaveFigure => self.export_figure(first),
+            Purpose::SaveEdited(number) => self.save_edited(number, &first),
         }
     }
 

@@ -121,6 +121,10 @@ impl Window {
         self.keep_recent();
         (self.set_for, self.ordered) = (None, None);
         self.measured.clear();
+        // What is selected may have become more or less.
+        if self.selection.condition.is_some() && self.find_selected().is_err() {
+            self.selection.clear();
+        }
     }
 
     /// Makes the settings anew if they changed, and orders a picture if anything did.

@@ -41,6 +41,11 @@ impl Window {
                 has_handles: self.parts.handles,
             };
             take(part(ui, "Clips", false, |ui| clips::show(ui, &model)));
+        }
+        if self.scene_view.is_some() {
+            take(part(ui, "Selection", false, |ui| self.selection(ui)));
+        }
+        if let Some(scene_view) = &self.scene_view {
             let film = self.exporting.as_ref().map(|film| {
                 let seconds = film.since.elapsed().as_secs_f32();
                 (film.step(), seconds)
