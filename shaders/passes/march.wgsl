@@ -327,23 +327,15 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
         }
         others += open_field(sheet);
         for (var r = 0u; r < ROWS; r++) {
-            // Facets divide the sheet: what lies before them, and behind them.
-            let place = place_of_facets(r, sheet);
-            var media: Halves;
-            media.front = resolve_radiance(r, sheet);
-            media.behind.hit = NO_HIT;
-            if HAS_FACETS {
-                divide(sheet, place, &media);
-            }
+            var mixture = resolve_radiance(r, sheet);
             if SCALAR {
                 for (var f = 0u; f < FIELDS; f++) {
-                    close_field(r, f, sheet, place, &media);
+                    close_field(r, f, sheet, &mixture);
                 }
             }
-            composite(r, vec2(planes[sheet], place), media.front);
+            composite(r, sheet, mixture);
             if HAS_FACETS {
                 cover(r, sheet);
-                composite(r, vec2(place, planes[sheet + 1u]), media.behind);
             }
         }
         sheet++;
@@ -354,23 +346,7 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     return others;
 }
 
-// What lies in a sheet before its facets and behind them.
-struct Halves {
-    front: Mixture,
-    behind: Mixture,
-}
-
-// Divides what is spread evenly over a sheet at a distance.
-fn divide(sheet: u32, place: f32, media: ptr<function, Halves>) {
-    let span = span_of(sheet);
-    let share = (place - span.x) / (span.y - span.x);
-    (*media).behind.color = (1.0 - share) * (*media).front.color;
-    (*media).behind.depth = (1.0 - share) * (*media).front.depth;
-    (*media).front.color *= share;
-    (*media).front.depth *= share;
-}
-
-fn close_field(r: u32, f: u32, sheet: u32, place: f32, media: ptr<function, Halves>) {
+fn close_field(r: u32, f: u32, sheet: u32, mixture: ptr<function, Mixture>) {
     var field: Sheet;
     resolve_field(r, f, sheet, &field);
     if CENTRAL {
@@ -379,26 +355,7 @@ fn close_field(r: u32, f: u32, sheet: u32, place: f32, media: ptr<function, Halv
     if SUMS {
         pixels[r].fields[f].front = field.back;
     }
-    // A loop, because drivers compile what it contains once.
-    var part = 0u;
-    loop {
-        var mixture = (*media).front;
-        var span = vec2(planes[sheet], place);
-        if HAS_FACETS && part == 1u {
-            mixture = (*media).behind;
-            span = vec2(place, planes[sheet + 1u]);
-        }
-        mix_field(r, f, sheet, field, span, &mixture);
-        if HAS_FACETS && part == 1u {
-            (*media).behind = mixture;
-        } else {
-            (*media).front = mixture;
-        }
-        part++;
-        if !HAS_FACETS || part == 2u || place >= planes[sheet + 1u] {
-            break;
-        }
-    }
+    mix_field(r, f, sheet, field, mixture);
 }
 
 // Finds the slopes on the plane behind the sheet being closed, from the values of the tile's

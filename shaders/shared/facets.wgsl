@@ -229,18 +229,8 @@ fn add_cover(
     covers[r].near_blue += near * color.z;
 }
 
-// Returns the distance at which the facets of the front lane's sheet lie: the back of the sheet
-// where there are none.
-fn place_of_facets(r: u32, sheet: u32) -> f32 {
-    let sums = covers[r];
-    if !(sums.front.x + sums.back.x > 0.0) {
-        return planes[sheet + 1u];
-    }
-    let distance = sums.distance.x / max(sums.weight.x, 1e-37);
-    return clamp(distance, planes[sheet], planes[sheet + 1u]);
-}
-
-// Composites the facets of the front lane's sheet, and shifts the lane out.
+// Composites the facets of the front lane's sheet, behind the rest of the sheet, and shifts the
+// lane out.
 fn cover(r: u32, sheet: u32) {
     let sums = covers[r];
     covers[r].front = shift(sums.front);

@@ -333,6 +333,6 @@ fn composite_field(r: u32, sheet: u32) {
     resolve_field(r, 0u, sheet, &field);
     var mixture: Mixture;
     mixture.hit = NO_HIT;
-    mix_field(r, 0u, sheet, field, span_of(sheet), &mixture);
-    composite(r, span_of(sheet), mixture);
+    mix_field(r, 0u, sheet, field, &mixture);
+    composite(r, sheet, mixture);
 }

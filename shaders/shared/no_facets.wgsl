@@ -4,10 +4,6 @@ const FACET_VECTORS: u32 = 0u;
 
 fn add_facet(entry: u32, front: u32, first_pixel: vec2<i32>) {}
 
-fn place_of_facets(r: u32, sheet: u32) -> f32 {
-    return planes[sheet + 1u];
-}
-
 fn cover(r: u32, sheet: u32) {}
 
 fn save_facets(r: u32, at: u32) {}

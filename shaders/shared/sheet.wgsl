@@ -375,7 +375,7 @@ fn pass_surface(
 // Returns how far the gradients of a sheet count behind the last clip before its end: at its front,
 // and the growth over its thickness.
 fn behind_clips(r: u32, f: u32, sheet: u32) -> vec2<f32> {
-    let span = span_of(sheet);
+    let span = vec2(planes[sheet], planes[sheet + 1u]);
     var entered = pixels[r].kept.x;
     for (var i = 0u; i < HOLES; i++) {
         let hole = pixels[r].holes[i];
@@ -392,9 +392,8 @@ fn share_at(medium: Medium, place: f32) -> f32 {
     return clamp(medium.share.x + place * medium.share.y, 0.0, 1.0);
 }
 
-// Returns a field's medium of a sheet between two distances, inside the box of the samples and what
-// the clips leave.
-fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet, span: vec2<f32>) -> Medium {
+// Returns a field's medium of a sheet, inside the box of the samples and what the clips leave.
+fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
     var medium: Medium;
     medium.through = 1.0;
     medium.peak = NO_VALUE;
@@ -422,8 +421,8 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet, span: vec2<f32>) -> Medi
         let normal = share_at(medium, 0.5) * turned(mean, direction_of(r), certain);
         medium.reaching = reaching_at(r, planes[sheet] + 0.5 * medium.thickness, normal);
     }
-    var begin = max(span.x, pixels[r].fields[f].inside.x);
-    let last = min(span.y, pixels[r].fields[f].inside.y);
+    var begin = max(planes[sheet], pixels[r].fields[f].inside.x);
+    let last = min(planes[sheet + 1u], pixels[r].fields[f].inside.y);
     if HOLES == 0u {
         if begin < last {
             pass_piece(r, f, sheet, field, begin, last, &medium);
@@ -449,20 +448,13 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet, span: vec2<f32>) -> Medi
     return medium;
 }
 
-// Adds a field's medium of a sheet between two distances to the mixture there.
-fn mix_field(
-    r: u32,
-    f: u32,
-    sheet: u32,
-    field: Sheet,
-    span: vec2<f32>,
-    mixture: ptr<function, Mixture>,
-) {
+// Adds a field's medium of a sheet to the mixture.
+fn mix_field(r: u32, f: u32, sheet: u32, field: Sheet, mixture: ptr<function, Mixture>) {
     // A gathered field may remain from sheets before the pass.
     if !field.has_value || !(GATHER || is_in_pass(sheet)) {
         return;
     }
-    var medium = pass_field(r, f, sheet, field, span);
+    var medium = pass_field(r, f, sheet, field);
     if MAXIMUM {
         pixels[r].hit = max(pixels[r].hit, medium.peak);
         return;
@@ -476,13 +468,8 @@ fn mix_field(
     (*mixture).hit = min((*mixture).hit, medium.hit);
 }
 
-// Returns the distances of the planes around a sheet.
-fn span_of(sheet: u32) -> vec2<f32> {
-    return vec2(planes[sheet], planes[sheet + 1u]);
-}
-
-// Adds a sheet, or a part of one between two distances, to the picture.
-fn composite(r: u32, span: vec2<f32>, mixture: Mixture) {
+// Adds a sheet to the picture.
+fn composite(r: u32, sheet: u32, mixture: Mixture) {
     let depth = mixture.depth;
     if MAXIMUM || !(depth > LEAST_DIVISOR) {
         return;
@@ -494,10 +481,10 @@ fn composite(r: u32, span: vec2<f32>, mixture: Mixture) {
     pixels[r].color += share / depth * premultiplied;
     // Inside the sheet, optical depth counts as evenly spread; an isosurface counts at its exact
     // place.
-    if mixture.hit < NO_HIT && before > 0.5 {
+    if mixture.hit < NO_HIT {
         pixels[r].hit = mixture.hit;
     } else if before > 0.5 && left <= 0.5 {
-        pixels[r].hit = mix(span.x, span.y, log(2.0 * before) / depth);
+        pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
     }
     pixels[r].transmittance = left;
 }

@@ -81,8 +81,8 @@ impl Drawing {
         [width.saturating_sub(margins).max(1), height]
     }
 
-    /// Lights a drawn picture by its depths, outlines what it shows, averages it down, and draws the
-    /// edges of its items over it.
+    /// Lights a drawn picture by its depths, outlines what it shows, and averages it down. Then it
+    /// draws the edges of its items over it.
     ///
     /// # Errors
     /// Those of [`Camera::view`], of [`Picture::reduced`] and of [`Items::draw_edges`].

@@ -24,8 +24,8 @@ use std::path::PathBuf;
 #[command(next_help_heading = "Appearance")]
 pub struct ShowFlags {
     /// Choose how the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung,
-    /// ct-angiography, mri, mr-brain, mr-angiography, generic, a JSON file, or its text. FILE=NAME is
-    /// for one input, and the flag can be given several times [default: made for the values, as
+    /// ct-angiography, mri, mr-brain, mr-angiography, generic, a JSON file, or its text. FILE=NAME
+    /// is for one input, and the flag can be given several times [default: made for the values, as
     /// `splatkit transfer` writes it]
     #[arg(long, value_name = "[FILE=]NAME|FILE.json", value_parser = transfer)]
     transfer: Vec<InputValue<String>>,

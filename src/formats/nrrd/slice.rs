@@ -104,9 +104,9 @@ mod tests {
         assert_eq!((grey.lattice.dims, grey.range), ([3, 2, 1], [1.0, 6.0]));
         assert_eq!(grey.lattice.spacing(), DVec3::new(0.5, 2.0, 1.0));
         let kinds = "dimension: 3\nsizes: 3 2 2\nkinds: RGB-color domain domain";
-        let colored = slice(kinds, &[9; 12]);
+        let colored = slice(kinds, &[9, 50, 70].repeat(4));
         assert_eq!(colored.lattice.dims, [2, 2, 1]);
-        assert_eq!(colored.colors.as_deref(), Some(&[[9, 9, 9, 255]; 4][..]));
+        assert_eq!(colored.colors.as_deref(), Some(&[[9, 50, 70, 255]; 4][..]));
     }
 
     #[test]

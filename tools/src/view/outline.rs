@@ -11,7 +11,7 @@ use eframe::egui::{
     epaint::Vertex,
 };
 use glam::{DVec2, DVec3};
-use splatkit::interaction::Probe;
+use splatkit::{interaction::Probe, math::View};
 
 /// The colours of what is selected: what is seen, and what lies behind something.
 const SEEN: Color32 = Color32::from_rgba_premultiplied(230, 110, 0, 235);
@@ -152,12 +152,12 @@ fn is_hidden(screen: &Screen, frame: Option<&Frame>, place: DVec3) -> bool {
     shown.is_some_and(|shown| at.z > view.to_view(shown).z + BEHIND * at.z.abs())
 }
 
-/// Returns the least and the greatest depth that a picture shows in an outline, by its corners in
-/// pixels; `None` if it shows nothing there.
-pub fn depths(frame: &Frame, size: [u32; 2], corners: &[DVec2]) -> Option<[f64; 2]> {
+/// Returns the least and the greatest depth in a view that a picture shows in an outline, by its
+/// corners in pixels; `None` if it shows nothing there. The picture may be of a view before.
+pub fn depths(frame: &Frame, now: &View, corners: &[DVec2]) -> Option<[f64; 2]> {
     /// Pixels along a side of the box around an outline that are tried.
     const TRIED: u32 = 96;
-    let view = frame.camera.view(size).ok()?;
+    let view = frame.camera.view(now.size).ok()?;
     let ends = [DVec2::INFINITY, DVec2::NEG_INFINITY];
     let [low, high] = corners.iter().fold(ends, |[low, high], at| [low.min(*at), high.max(*at)]);
     let mut depths: Option<[f64; 2]> = None;
@@ -169,7 +169,7 @@ pub fn depths(frame: &Frame, size: [u32; 2], corners: &[DVec2]) -> Option<[f64; 
             continue;
         }
         if let Some(shown) = Probe::picked(&frame.picture, &view, pixel) {
-            let depth = view.to_view(shown).z;
+            let depth = now.to_view(shown).z;
             let [near, far] = depths.unwrap_or([depth; 2]);
             depths = Some([near.min(depth), far.max(depth)]);
         }

@@ -13,12 +13,15 @@ use splatkit::{
     edit::{Edit, Sight},
     formats::Kind,
     glam::DVec2,
+    scene::Settings,
     session::{Description, EditEntry, convert::Conversion},
 };
 use std::path::{Path, PathBuf};
 
 /// How much deeper than what is seen an outline selects, as a share of the scene's diagonal.
 const DEEPER: f64 = 0.02;
+/// The same in sheets of a picture of surfaces.
+const SHEETS: f64 = 2.0;
 
 impl Window {
     /// Does what a user asks for of the selection.
@@ -56,13 +59,15 @@ impl Window {
         };
         if self.selection.is_near {
             let frame = self.frame.as_ref();
-            let shown = frame.and_then(|frame| outline::depths(frame, self.size, corners));
+            let shown = frame.and_then(|frame| outline::depths(frame, &view, corners));
             let Some([_, far]) = shown else {
                 return self.say("nothing is seen in the outline", true);
             };
-            // What a picture shows may lie a sheet before the points that it is of.
+            // What a picture shows may lie sheets before the points that it is of.
+            let pixel = if view.perspective { far } else { 1.0 } / view.scale;
+            let sheets = SHEETS * Settings::new(self.size).sheet_pixels * pixel;
             let diagonal = scene_view.stage.loaded.subject.bounds.diagonal();
-            depths[1] = rounded(far + DEEPER * diagonal);
+            depths[1] = rounded(far + sheets.max(DEEPER * diagonal));
         }
         let mut sight = Sight::of(&view, corners, depths.map(rounded));
         for corner in &mut sight.corners {
