@@ -125,8 +125,7 @@ fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
     let gradient = gradient_at(r, f, medium, place);
     let shade = frame.fields[f].shade;
     let certain = frame.fields[f].certain.xy;
-    let counts = share_at(medium, place);
-    return light_of(gradient, direction_of(r), shade, certain, counts, medium.reaching);
+    return light_of(gradient, direction_of(r), shade, certain, medium.share, medium.reaching);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -223,8 +222,8 @@ struct Medium {
     along: vec3<f32>,
     // The light that reaches the middle of the sheet.
     reaching: Reaching,
-    // How far gradients count behind a clip: at the front, and its growth over the thickness.
-    share: vec2<f32>,
+    // How far gradients count behind a clip.
+    share: f32,
     // The largest value.
     peak: f32,
     // The distance at which an isosurface absorbed half of the light.
@@ -367,29 +366,22 @@ fn pass_surface(
     var color = surface.color.xyz;
     if VOLUME_SHADED {
         let gradient = gradient_at(r, f, *medium, place);
-        color = lit_field(r, f, color, gradient, share_at(*medium, place), (*medium).reaching);
+        color = lit_field(r, f, color, gradient, (*medium).share, (*medium).reaching);
     }
     (*medium).color += share * color;
 }
 
-// Returns how far the gradients of a sheet count behind the last clip before its end: at its front,
-// and the growth over its thickness.
-fn behind_clips(r: u32, f: u32, sheet: u32) -> vec2<f32> {
-    let span = vec2(planes[sheet], planes[sheet + 1u]);
+// Returns how far the gradients of a sheet count behind the last clip before its end, by the depth
+// of its middle.
+fn behind_clips(r: u32, f: u32, sheet: u32) -> f32 {
+    let middle = 0.5 * (planes[sheet] + planes[sheet + 1u]);
     var entered = pixels[r].kept.x;
     for (var i = 0u; i < HOLES; i++) {
         let hole = pixels[r].holes[i];
-        entered = select(entered, max(entered, hole.y), hole.x < hole.y && hole.y < span.y);
+        let is_before = hole.x < hole.y && hole.y < planes[sheet + 1u];
+        entered = select(entered, max(entered, hole.y), is_before);
     }
-    return vec2(span.x - entered, span.y - span.x) * frame.fields[f].certain.z;
-}
-
-// Returns how far the gradient counts at a place of a sheet.
-fn share_at(medium: Medium, place: f32) -> f32 {
-    if CLIPS + HOLES == 0u {
-        return 1.0;
-    }
-    return clamp(medium.share.x + place * medium.share.y, 0.0, 1.0);
+    return clamp((middle - entered) * frame.fields[f].certain.z, 0.0, 1.0);
 }
 
 // Returns a field's medium of a sheet, inside the box of the samples and what the clips leave.
@@ -410,6 +402,7 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
             medium.along = vec3(field.front.along, field.inside.along, field.back.along);
         }
     }
+    medium.share = 1.0;
     if VOLUME_SHADED && CLIPS + HOLES > 0u {
         medium.share = behind_clips(r, f, sheet);
     }
@@ -418,7 +411,7 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
         let mean = (towards_eye(r, gradient_at(r, f, medium, 0.0))
             + towards_eye(r, gradient_at(r, f, medium, 0.5))
             + towards_eye(r, gradient_at(r, f, medium, 1.0))) / 3.0;
-        let normal = share_at(medium, 0.5) * turned(mean, direction_of(r), certain);
+        let normal = medium.share * turned(mean, direction_of(r), certain);
         medium.reaching = reaching_at(r, planes[sheet] + 0.5 * medium.thickness, normal);
     }
     var begin = max(planes[sheet], pixels[r].fields[f].inside.x);

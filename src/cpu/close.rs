@@ -274,7 +274,7 @@ impl Plan<'_> {
         let on = (layer.direction, reaching);
         if is_steady {
             let middle = (place + next_place) * 0.5;
-            let gradient = (self.gradient(layer, middle), layer.share_at(simd, middle));
+            let gradient = (self.gradient(layer, middle), layer.share);
             return self.lit_field(simd, color, gradient, on);
         }
         let none = Lanes::splat(simd, 0.0);
@@ -282,7 +282,7 @@ impl Plan<'_> {
         for number in 0..LIGHTS {
             let share = (number as f32 + 0.5) / LIGHTS as f32;
             let at = (next_place - place) * share + place;
-            let gradient = (self.gradient(layer, at), layer.share_at(simd, at));
+            let gradient = (self.gradient(layer, at), layer.share);
             let light = self.light_of(simd, gradient, on);
             sums = [sums[0] + light[0], sums[1] + light[1]];
         }
@@ -290,22 +290,18 @@ impl Plan<'_> {
         with_light(simd, color, share, highlight)
     }
 
-    /// Returns how far the gradients of a sheet count behind the last clip before its end: at its
-    /// front, and the growth over its thickness.
+    /// Returns how far the gradients of a sheet count behind the last clip before its end, by the
+    /// depth of its middle.
     #[inline(always)]
-    pub fn behind_clips<S: Simd>(
-        &self,
-        simd: S,
-        layer: &Layer<S>,
-        rays: &Rays<S>,
-    ) -> [Lanes<S>; 2] {
+    pub fn behind_clips<S: Simd>(&self, simd: S, layer: &Layer<S>, rays: &Rays<S>) -> Lanes<S> {
         let mut entered = rays.kept[0];
         for [from, to] in &rays.holes[..self.holes] {
             let is_before = from.simd_lt(*to) & to.simd_lt(layer.start + layer.thickness);
             entered = is_before.select(entered.max(*to), entered);
         }
-        let per_depth = Lanes::splat(simd, self.field.per_depth);
-        [(layer.start - entered) * per_depth, layer.thickness * per_depth]
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let depth = layer.thickness.mul_add(0.5, layer.start) - entered;
+        (depth * self.field.per_depth).max(none).min(one)
     }
 
     /// Adds the field in a sheet, at the pixels of a mask, to what lies in the sheet. In a maximum
@@ -568,7 +564,7 @@ impl Plan<'_> {
                 [0, 1, 2].map(|channel| of_met(up.color[channel], down.color[channel]));
             if self.is_lit {
                 let at = place + (next_place - place) * share;
-                let normal = (self.gradient(layer, at), layer.share_at(simd, at));
+                let normal = (self.gradient(layer, at), layer.share);
                 surface = self.lit_field(simd, surface, normal, (layer.direction, reaching));
             }
             for (sum, channel) in medium.color.iter_mut().zip(surface) {

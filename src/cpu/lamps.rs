@@ -237,8 +237,7 @@ impl Plan<'_> {
             return Reaching::all(simd);
         }
         let gradient = self.towards_eye(simd, layer);
-        let share = layer.share_at(simd, Lanes::splat(simd, 0.5));
-        let turned = Turned::new(simd, gradient, layer.direction, self.certain(), share);
+        let turned = Turned::new(simd, gradient, layer.direction, self.certain(), layer.share);
         Reaching::at(simd, self, rays, layer.thickness.mul_add(0.5, layer.start), &turned)
     }
 

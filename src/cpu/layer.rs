@@ -39,9 +39,8 @@ pub struct Layer<S: Simd> {
     /// The gradients in view space at the front, in the middle and at the back, in entries per
     /// thickness of a sheet. `None` where only those of the faces are known, and only across.
     pub sections: Option<Sections<S>>,
-    /// How far gradients count, behind a clip: at the front, and its growth over the thickness.
-    /// Less than 0 is 0, and more than 1 is 1. `None` without clips.
-    pub share: Option<[Lanes<S>; 2]>,
+    /// How far gradients count behind a clip, from 0 to 1; `None` without clips.
+    pub share: Option<Lanes<S>>,
 }
 
 /// Gradients at three places of a sheet.
@@ -72,14 +71,6 @@ impl<S: Simd> Layer<S> {
             sections: None,
             share: None,
         }
-    }
-
-    /// Returns how far the gradient counts at a place; `None` if in full.
-    #[inline(always)]
-    pub fn share_at(&self, simd: S, u: Lanes<S>) -> Option<Lanes<S>> {
-        let [first, growth] = self.share?;
-        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        Some(growth.mul_add(u, first).max(none).min(one))
     }
 
     #[inline(always)]

@@ -55,7 +55,7 @@ impl<'a> LitBy<'a> {
         let lamps = lamps.zip(shade).map(|(lamps, shade)| {
             let gradient = layer.towards_eye(ray.direction);
             let at = (ray, layer.distance(0.5));
-            let gradient = (gradient, layer.share(0.5));
+            let gradient = (gradient, layer.share());
             (lamps.lighting, lamps.reaching(gradient, at, shade))
         });
         Self { shade, lamps }
@@ -158,16 +158,17 @@ impl Layer {
         for number in 0..LIGHTS {
             let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
             let at = start + share * (end - start);
-            let gradient = (self.gradient(at, direction), self.share(at));
+            let gradient = (self.gradient(at, direction), self.share());
             let light = shade::light(gradient, direction, shade, &lit.lamps);
             (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
         }
         shade::with_light(color, sums)
     }
 
-    /// Returns how far the gradient counts at a place.
-    fn share(&self, u: f64) -> f64 {
-        let behind = |[clip, depth]: [f64; 2]| ((self.distance(u) - clip) / depth).clamp(0.0, 1.0);
+    /// Returns how far the gradient counts: by the depth of the sheet's middle behind a clip.
+    fn share(&self) -> f64 {
+        let middle = self.distance(0.5);
+        let behind = |[clip, depth]: [f64; 2]| ((middle - clip) / depth).clamp(0.0, 1.0);
         self.clipped.map_or(1.0, behind)
     }
 
@@ -240,7 +241,7 @@ impl Layer {
                     span: [before, share].map(|share| self.distance(at(share))),
                 });
                 if let Some(surface) = surface {
-                    let gradient = (self.gradient(at(share), direction), self.share(at(share)));
+                    let gradient = (self.gradient(at(share), direction), self.share());
                     let lit = lit_by.one(DVec3::from(surface.color), gradient, direction);
                     color += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;

@@ -64,10 +64,10 @@ fn another_array_gives_the_opacity() {
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
     let pixel = |x: usize, y: usize| pixels[4 * (64 * y + x)..][..3].to_vec();
-    // Viridis rises from blue to green along x; around the block there is nothing.
+    // Viridis rises from blue to green along x; around the block there is next to nothing.
     let (left, right) = (pixel(24, 32), pixel(40, 32));
     assert!(left[2] > left[1] && right[1] > right[2], "{left:?} {right:?}");
-    assert_eq!(pixel(1, 1), [0; 3]);
+    assert!(pixel(1, 1).iter().all(|channel| *channel < 8), "{:?}", pixel(1, 1));
     folder.run("render a.vtk -o b.png --opacity-from none").fails(3, &["none"]);
     let run = "render a.vtk -o b.png --scalar heat --opacity-from mass --iso 3";
     folder.run(run).fails(3, &["the opacity of another array"]);
