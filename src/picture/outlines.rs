@@ -74,7 +74,7 @@ impl Depths<'_> {
             ];
             let steepest = slopes[0].abs().max(slopes[1].abs());
             // Halfway to what lies behind.
-            (jump > least + SLOPES * steepest).then(|| 0.5 * (z + other))
+            (jump > least + SLOPES * steepest).then_some(0.5 * (z + other))
         };
         [[1, 0], [-1, 0], [0, 1], [0, -1]].into_iter().filter_map(limit).reduce(f32::min)
     }
@@ -104,9 +104,10 @@ impl Picture {
         let depth = &self.depth;
         self.color.par_chunks_mut(size[0]).enumerate().for_each(|(y, row)| {
             let mut shares = vec![0.0f32; size[0]];
-            for other in y.saturating_sub(reach)..(y + reach + 1).min(size[1]) {
+            let beside = rims.iter().enumerate().take(y + reach + 1).skip(y.saturating_sub(reach));
+            for (other, rims) in beside {
                 let down = other.abs_diff(y) as f32;
-                for &(at, behind) in &rims[other] {
+                for &(at, behind) in rims {
                     for x in at.saturating_sub(reach)..(at + reach + 1).min(size[0]) {
                         let distance = down.hypot(at.abs_diff(x) as f32);
                         if depth[y * size[0] + x] >= behind {

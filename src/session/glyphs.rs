@@ -276,7 +276,7 @@ impl Field {
         // Fewer ellipsoids are larger in the picture.
         let shape = Mesh::sphere(match chosen.len() {
             ..=400 => 3,
-            ..=2000 => 2,
+            401..=2000 => 2,
             _ => 1,
         });
         let mut mesh = self.empty(&chosen);

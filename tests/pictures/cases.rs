@@ -48,7 +48,8 @@ fn least_of_gathered(name: &str) -> f64 {
 /// back of their sheets, the reference where they lie in them.
 fn least_of_facets(name: &str) -> f64 {
     match name {
-        "facets_in_a_volume" | "rods_among_others" => 45.0,
+        "facets_in_a_volume" | "facets_in_two_volumes" | "rods_among_others" => 44.0,
+        "gaussians_among_everything" => 44.0,
         _ => LEAST,
     }
 }
@@ -136,6 +137,7 @@ fn check(case: &Case, least: f64, as_a_gpu: &[Evaluate]) {
         assert!(error.contains(&what), "{}: {error}", case.name);
         return;
     }
+    let least = least.min(least_of_facets(case.name));
     let picture = by_gpu(gpu(), case, Evaluate::Scatter).expect(case.name);
     save(case, "scattered", &picture);
     assert_agrees(case, "scattered", psnr(&picture, &truth.scattered), least);
@@ -366,7 +368,7 @@ fn trained_gaussians() {
 
 #[test]
 fn facets() {
-    facets::all().iter().for_each(|case| check(case, least_of_facets(case.name), &[]));
+    facets::all().iter().for_each(|case| check(case, LEAST, &[]));
 }
 
 /// Scenes of several fields. The GPU engine refuses a few.

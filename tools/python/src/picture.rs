@@ -177,10 +177,10 @@ impl Picture {
         py: Python<'_>,
         path: PathBuf,
         background: Option<[f32; 3]>,
-        bits: Option<u32>,
-        dpi: Option<f64>,
+        stored: (Option<u32>, Option<f64>),
         layers: Option<PyRef<'_, Layers>>,
     ) -> PyResult<()> {
+        let (bits, dpi) = stored;
         let pixels = self.pixels.clone();
         let layers = layers.map(|layers| layers.0.clone()).unwrap_or_default();
         run(py, &Stop::default(), move || {

@@ -450,12 +450,12 @@ impl Scene {
     fn add_volume(
         &self,
         py: Python<'_>,
-        channels: Vec<Bound<'_, PyAny>>,
-        opacity: Option<Bound<'_, PyAny>>,
+        arrays: (Vec<Bound<'_, PyAny>>, Option<Bound<'_, PyAny>>),
         facts: &str,
         load: &str,
         appearance: &str,
     ) -> PyResult<()> {
+        let (channels, opacity) = arrays;
         let (facts, more) =
             array_options(facts, load, appearance).map_err(|error| raise(py, &error))?;
         let read = channels_read(&facts, channels.len(), more.1.channels_read().as_deref());

@@ -214,7 +214,7 @@ def _put_volume(native: _pysplatkit.Scene, item: Item) -> None:
     appearance = _options.appearance(arguments)
     array = arguments["array"]
     channels = list(array) if array.ndim == 4 else [array]
-    native.add_volume(channels, arguments["opacity_from"], facts, "{}", appearance)
+    native.add_volume((channels, arguments["opacity_from"]), facts, "{}", appearance)
 
 
 def _plain_mesh(given: Arguments) -> Arguments:

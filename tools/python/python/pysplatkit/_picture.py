@@ -141,7 +141,7 @@ class Picture:
         density = self._dpi if dpi is None else float(dpi)
 
         def write(to: Path) -> None:
-            self._native.save(to, self._background, bits, density, self._layers)
+            self._native.save(to, self._background, (bits, density), self._layers)
 
         return self._written(path, overwrite, write)
 

@@ -16,8 +16,7 @@ class Scene:
     def forked(self, count: int) -> Scene: ...
     def add_volume(
         self,
-        channels: list[npt.NDArray[Any]],
-        opacity: npt.NDArray[Any] | None,
+        arrays: tuple[list[npt.NDArray[Any]], npt.NDArray[Any] | None],
         facts: str,
         load: str,
         appearance: str,
@@ -62,8 +61,7 @@ class Picture:
         self,
         path: str | PathLike[str],
         background: list[float] | None,
-        bits: int | None,
-        dpi: float | None,
+        stored: tuple[int | None, float | None],
         layers: Layers | None,
     ) -> None: ...
     def save_depth(self, path: str | PathLike[str]) -> None: ...
