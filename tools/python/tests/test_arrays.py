@@ -133,7 +133,7 @@ def test_missing_values(whole):
     [
         (np.zeros((0, 3, 4)), "three axes"),
         (np.zeros((3, 4)), "three axes"),
-        (np.zeros((2, 3, 4, 5)), "choose one time or component"),
+        (np.zeros((2, 3, 4, 5)), "channel_axis=0 draws all channels"),
         (np.array(5.0), "three axes"),
         (np.full((2, 2, 2), "x"), "has the type <U1"),
         (np.full((2, 2, 2), None), "has the type object"),

@@ -55,7 +55,7 @@ SAVED = [
         {"bytes.npy": {"colormap": "hot"}, "colors.ply": {"colormap": "hot"}},
         {"camera": CAMERA},
     ),
-    ({"cloud.ply": {"edits": [("where", "x>1"), ("thin", "50%")]}}, {}),
+    ({"cloud.ply": {"edits": [("where", "x>-9"), ("thin", "50%")]}}, {}),
 ]
 
 

@@ -118,7 +118,9 @@ def test_options_are_those_of_the_signatures():
     """The types of options that several functions share have the names of `Scene.render`."""
     from pysplatkit import _options
 
-    names = set(inspect.signature(pysplatkit.Scene.render).parameters) - {"self", "size", "camera"}
+    # Scene files say nothing of layers.
+    own = {"self", "size", "camera", "layers"}
+    names = set(inspect.signature(pysplatkit.Scene.render).parameters) - own
     assert names == set(_options.Saved.__annotations__)
     one = set(inspect.signature(pysplatkit.render).parameters) - {"source", "size", "camera"}
     rest = set(_options.RenderOptions.__annotations__)

@@ -83,7 +83,7 @@ class Item:
         """The path, and as JSON how the file is read, shown, moved and edited; None for an array."""
         if self.method != "add":
             return None
-        edits = _values.text(self.arguments.get("edits", []))
+        edits = json.dumps(self.arguments.get("edits") or [])
         return self.arguments["source"], *_file_options(self.arguments), self.transform, edits
 
 
