@@ -65,8 +65,8 @@ vec![
     (
         "flat.h5",
         hdf5(&[2, 2]),
-        "flat.h5: file: has neither numbers of three dimensions nor a picture of two; it has “v”, u8 \
-         (2, 2)",
+        "flat.h5: file: has neither numbers of three dimensions nor a picture of two; it has “v”, \
+         u8 (2, 2)",
     ),
     // NRRD.
     (
