@@ -220,6 +220,10 @@
 //! The diffuse part is multiplied by 1 − c·(1 − cos), the highlight by c. So what is flat, or as
 //! noisy as a flat region, is drawn as if it faced the eye. Normals of radiance are certain.
 //!
+//! Behind a clip, c is multiplied by s/(2·h), 1 at most. Here s is the length of the ray from the
+//! last clip before the sheet's end to its middle, and h the lattice's smallest spacing. So a cut
+//! face shows values, and not the relief of their noise.
+//!
 //! **Other lights** ([`Lighting`](crate::scene::Lighting)). The diffuse light and the highlight are
 //! divided into shares: `head` from the eye, `key` from a lamp, `sky` from all sides. n is the
 //! normal of length 1 towards the eye, c its certainty, l the direction to the lamp, and cos' =
