@@ -11,7 +11,7 @@
 //! | `region` | the shapes of `crop` |
 //! | `motion` | moves, turns, scales and matrices |
 //! | `reproject` | other coordinate reference systems |
-//! | `thin`, `merge` | fewer points, and fewer splats that look the same |
+//! | `thin`, `coarser`, `merge` | fewer points, coarser meshes, and fewer splats that look the same |
 //! | `clusters` | floaters, and the largest parts |
 //! | `surface`, `records`, `gaussians`, `splats` | the scenes that are edited |
 //! | `stream` | points larger than memory |
@@ -32,6 +32,7 @@
 //! ```
 
 mod clusters;
+mod coarser;
 mod expression;
 mod gaussians;
 mod merge;

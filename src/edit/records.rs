@@ -6,25 +6,38 @@ use crate::{
     formats::Records,
     surface::{Mesh, SurfelOptions},
 };
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// The names of normals and colours.
 pub(super) const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 pub(super) const COLOR: [&str; 4] = ["red", "green", "blue", "alpha"];
 
 impl Records {
-    /// Appends points of the same attributes.
-    pub(crate) fn append(&mut self, mut other: Self) {
-        self.positions.append(&mut other.positions);
-        self.normals.append(&mut other.normals);
-        self.colors.append(&mut other.colors);
-        if self.columns.is_empty() {
-            self.attributes = other.attributes;
-            self.columns = other.columns;
-        } else {
-            let columns = self.columns.iter_mut().zip(&mut other.columns);
-            columns.for_each(|(column, more)| column.append(more));
+    /// Adds points. Where some have no value of an attribute, it is not a number; where some have
+    /// no normals or colours, they are 0 and white.
+    pub(crate) fn join(&mut self, other: Self) {
+        let (before, after) = (self.positions.len(), self.positions.len() + other.positions.len());
+        self.positions.extend(other.positions);
+        if !self.normals.is_empty() || !other.normals.is_empty() {
+            self.normals.resize(before, Vec3::ZERO);
+            self.normals.extend(other.normals);
+            self.normals.resize(after, Vec3::ZERO);
         }
+        if !self.colors.is_empty() || !other.colors.is_empty() {
+            self.colors.resize(before, [255; 4]);
+            self.colors.extend(other.colors);
+            self.colors.resize(after, [255; 4]);
+        }
+        for (attribute, more) in other.attributes.into_iter().zip(other.columns) {
+            let known = self.attributes.iter().position(|known| known.name == attribute.name);
+            let at = known.unwrap_or_else(|| {
+                self.attributes.push(attribute);
+                self.columns.push(vec![f64::NAN; before]);
+                self.columns.len() - 1
+            });
+            self.columns[at].extend(more);
+        }
+        self.columns.iter_mut().for_each(|column| column.resize(after, f64::NAN));
     }
 }
 

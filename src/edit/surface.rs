@@ -1,7 +1,9 @@
 //! Meshes and point clouds in memory.
 
 use super::{
-    Editable, Mapping, Motion, find,
+    Editable, Mapping, Motion,
+    coarser::coarsen,
+    find,
     records::{plain_column, plain_names},
     retain,
     thin::Thin,
@@ -112,14 +114,13 @@ impl Editable for Surface {
     }
 
     fn thin(&mut self, thin: &Thin) -> Result<()> {
-        if !self.mesh.triangles.is_empty() || !self.mesh.lines.is_empty() {
-            return Err(Error::Argument(
-                "a mesh is not thinned: its vertices are joined; write it as .splk, which is \
-                 coarser from afar"
-                    .into(),
-            ));
+        if !self.mesh.lines.is_empty() {
+            return Err(Error::Argument("lines are not thinned: their points are joined".into()));
         }
-        let kept = thin.kept(&self.mesh.positions)?;
+        let mut kept = thin.kept(&self.mesh.positions)?;
+        if !self.mesh.triangles.is_empty() {
+            coarsen(&mut self.mesh, &mut kept);
+        }
         self.keep(&kept);
         Ok(())
     }

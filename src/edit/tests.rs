@@ -67,7 +67,7 @@ fn pass(paths: &[&Path], edits: &[Edit], memory: u64) -> Result<(Records, Vec<Ch
     let pass = Pass::new(streams, edits, context, None, None)?;
     let mut all = Records::default();
     let changes = pass.run(|records| {
-        all.append(records);
+        all.join(records);
         Ok(())
     })?;
     Ok((all, changes))
@@ -265,8 +265,9 @@ fn meshes_keep_whole_triangles() {
         // Mirrored triangles still show their outside.
         assert!((b - a).cross(c - a).dot(a) > 0.0);
     }
+    ball.mesh.lines.push([0, 1]);
     let message = apply(&mut ball, &[Edit::Thin(Thin::Share(0.5))], &Context::default());
-    assert!(message.unwrap_err().to_string().contains("a mesh is not thinned"));
+    assert!(message.unwrap_err().to_string().contains("lines are not thinned"));
 }
 
 #[test]

@@ -45,7 +45,8 @@ impl FromStr for Thin {
 /// The name of this module's work in errors.
 const WORK: &str = "thinning points";
 
-/// Bytes of memory for each kept point: its cell, in a table that may have just been doubled.
+/// Bytes of memory for each kept point of one slab: its cell, in a table that may have just been
+/// doubled.
 const OF_KEPT: u64 = 110;
 
 /// How many more points than wanted a distance may keep, as a part of those wanted. The surplus is
@@ -96,9 +97,10 @@ fn spread(places: &[Vec3], wanted: u64) -> Vec<bool> {
     let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (low, high) = places.iter().fold(none, |(low, high), at| (low.min(*at), high.max(*at)));
     let size = high - low;
-    let blocks = Blocks { low, edge: (size.max_element() / BLOCKS as f32).max(f32::MIN_POSITIVE) };
+    let edge = (size.max_element() / BLOCKS as f32).max(f32::MIN_POSITIVE);
+    let blocks = Blocks { low, edge, along: size.max_position() };
     // Block by block, the cells around a point are in the processor's cache.
-    let order = blocks.order(places);
+    let order = &blocks.order(places);
     // The points of a surface fill an area.
     let mut guess = f64::from(size.length()) / (wanted as f64).sqrt();
     let largest = f64::from(size.length());
@@ -110,16 +112,18 @@ fn spread(places: &[Vec3], wanted: u64) -> Vec<bool> {
         if sample.len() > SAMPLE / 4 {
             let share = sample.len() as f64 / places.len() as f64;
             let of_sample = (wanted as f64 * share).ceil() as u64;
-            guess = search(places, &sample, of_sample, [guess, largest]).0;
+            guess = search((places, &blocks), &sample, of_sample, [guess, largest]).0;
         }
     }
-    search(places, &order, wanted, [guess, largest]).1
+    search((places, &blocks), order, wanted, [guess, largest]).1
 }
 
-/// Blocks of space, in a grid.
+/// Blocks of space, in a grid of slabs. What was kept two slabs before is not needed any more.
 struct Blocks {
     low: Vec3,
     edge: f32,
+    /// The axis along which slabs follow each other: the longest.
+    along: usize,
 }
 
 /// Blocks along the longest side of all points.
@@ -132,7 +136,13 @@ impl Blocks {
     /// Returns the number of a point's block.
     fn of(&self, place: Vec3) -> u32 {
         let cell = ((place - self.low) / self.edge).as_uvec3().min(UVec3::splat(BLOCKS - 1));
-        (cell.z * BLOCKS + cell.y) * BLOCKS + cell.x
+        let [slab, row, column] = [0, 1, 2].map(|step| cell[(self.along + step) % 3]);
+        (slab * BLOCKS + row) * BLOCKS + column
+    }
+
+    /// Returns the number of the slab that a block lies in.
+    fn slab(block: u32) -> u32 {
+        block / (BLOCKS * BLOCKS)
     }
 
     /// Returns the indices of points, block by block. In a block they keep their order.
@@ -155,7 +165,7 @@ impl Blocks {
 /// Tries distances of some points, from a guess on and below a largest one. Returns one that keeps
 /// enough points and few more, and which of all it keeps.
 fn search(
-    places: &[Vec3],
+    (places, blocks): (&[Vec3], &Blocks),
     order: &[u32],
     wanted: u64,
     [guess, largest]: [f64; 2],
@@ -167,7 +177,9 @@ fn search(
     let mut kept = vec![false; places.len()];
     let mut distance = guess;
     for _ in 0..TRIES {
-        let Some(count) = keep(places, order, distance, 4 * wanted, &mut kept) else { break };
+        let Some(count) = keep((places, blocks), order, distance, 4 * wanted, &mut kept) else {
+            break;
+        };
         let is_enough = count >= wanted;
         ends[usize::from(!is_enough)] = distance;
         if is_enough && count <= 4 * wanted {
@@ -181,25 +193,31 @@ fn search(
         distance = between(ends[0], ends[1], distance * ratio.sqrt());
     }
     // Without a distance, all are kept.
-    if keep(places, order, best, u64::MAX, &mut kept).is_none() {
+    if keep((places, blocks), order, best, u64::MAX, &mut kept).is_none() {
         order.iter().for_each(|at| kept[*at as usize] = true);
     }
     (best, kept)
 }
 
 /// Marks the points that a distance keeps, until there are more than some. Returns their number;
-/// `None` for a distance that 32 bits do not hold.
+/// `None` for a distance that 32 bits do not hold. The order is that of the blocks.
 fn keep(
-    places: &[Vec3],
+    (places, blocks): (&[Vec3], &Blocks),
     order: &[u32],
     distance: f64,
     most: u64,
     kept: &mut [bool],
 ) -> Option<u64> {
     let mut discs = Discs::new(distance).ok()?;
-    let mut count = 0;
+    let (mut count, mut slab) = (0, 0);
     for at in order {
         let at = *at as usize;
+        let next = Blocks::slab(blocks.of(places[at]));
+        if next > slab && blocks.edge > discs.distance {
+            let start = blocks.low[blocks.along] + next as f32 * blocks.edge;
+            discs.enter((blocks.along, start), next == slab + 1);
+            slab = next;
+        }
         kept[at] = discs.keep(places[at]);
         count += u64::from(kept[at]);
         if count > most {
@@ -228,6 +246,9 @@ fn leave_out(kept: &mut [bool], surplus: u64) {
 pub(super) struct Discs {
     distance: f32,
     cells: Cells,
+    /// Those of the slab before, and from where on along which axis none of them is near. What was
+    /// kept before that is forgotten.
+    behind: Option<(Cells, usize, f32)>,
 }
 
 impl Discs {
@@ -238,7 +259,24 @@ impl Discs {
             return Err(Error::Argument(format!("points cannot be {distance} apart")));
         }
         let distance = distance as f32;
-        Ok(Self { distance, cells: Cells::new(distance) })
+        Ok(Self { distance, cells: Cells::new(distance, FEWEST), behind: None })
+    }
+
+    /// Begins a slab of space, thicker than the distance, from this place on along this axis. No
+    /// point comes before it any more. `is_next` says that it touches the slab before.
+    fn enter(&mut self, (axis, start): (usize, f32), is_next: bool) {
+        let slots = self.cells.slots.len();
+        let before = std::mem::replace(&mut self.cells, Cells::new(self.distance, slots));
+        // A margin, because places are rounded.
+        self.behind = is_next.then_some((before, axis, start + 1.001 * self.distance));
+    }
+
+    /// Whether a cell holds a point that is nearer to a place than the root of `least`.
+    fn has_near(&self, key: u64, place: Vec3, least: f32) -> bool {
+        let is_behind = |(cells, axis, end): &(Cells, usize, f32)| {
+            place[*axis] < *end && cells.has_near(key, place, least)
+        };
+        self.cells.has_near(key, place, least) || self.behind.as_ref().is_some_and(is_behind)
     }
 
     /// Returns whether a point is far enough from all kept before, and keeps it then.
@@ -248,7 +286,7 @@ impl Discs {
         let (inside, cell) = (scaled - corner, corner.as_ivec3());
         let least = self.distance * self.distance;
         // The point's own cell is the likeliest to hold a near one.
-        if self.cells.has_near(key(cell), place, least) {
+        if self.has_near(key(cell), place, least) {
             return false;
         }
         // The sides to which the point is nearer come first.
@@ -267,7 +305,7 @@ impl Discs {
                 continue;
             }
             let cell = cell.wrapping_add(toward * IVec3::from_array(steps));
-            if self.cells.has_near(key(cell), place, least) {
+            if self.has_near(key(cell), place, least) {
                 return false;
             }
         }
@@ -332,6 +370,9 @@ struct Slot {
 
 const IN_SLOT: usize = 2;
 
+/// Slots of a table at first.
+const FEWEST: usize = 64;
+
 /// A table of slots. A cell with more points than a slot holds has several. At most half of the
 /// slots are used, so that cells without points are soon known to be.
 struct Cells {
@@ -341,8 +382,9 @@ struct Cells {
 }
 
 impl Cells {
-    fn new(distance: f32) -> Self {
-        Self { distance, slots: vec![Slot::default(); 64], used: 0 }
+    /// An empty table of a power of two of slots.
+    fn new(distance: f32, slots: usize) -> Self {
+        Self { distance, slots: vec![Slot::default(); slots], used: 0 }
     }
 
     /// Returns the cell of a place.
@@ -446,7 +488,7 @@ mod tests {
         }
         let kept = chosen(&places, &Thin::Share(0.1).kept(&places).unwrap());
         assert_eq!(kept.len(), 2000);
-        // They are evenly spread: a random choice has points at a hundredth of this distance.
+        // They are evenly spread, also where a slab ends: a random choice has points at a hundredth of this distance.
         let nearest = |at: usize| {
             let others = kept.iter().enumerate().filter(|(other, _)| *other != at);
             others.map(|(_, other)| other.distance(kept[at])).fold(f32::INFINITY, f32::min)

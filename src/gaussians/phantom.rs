@@ -74,7 +74,7 @@ fn golden(index: usize) -> f32 {
 
 /// A flat Gaussian as wide as its share of an area.
 fn flat(area: f32, count: usize) -> Vec3 {
-    let side = 0.55 * (area / count as f32).sqrt();
+    let side = 0.7 * (area / count as f32).sqrt();
     Vec3::new(side, side, 0.1 * side)
 }
 
@@ -105,7 +105,7 @@ fn ring(index: usize, count: usize) -> Made {
     let normal = outward * v.cos() + Vec3::Y * v.sin();
     let middle = Vec3::new(0.9, 0.6, -0.2) + RADII[0] * outward;
     let hue = [0.0, 1.0 / 3.0, 2.0 / 3.0].map(|shift| 0.5 + 0.45 * (u + TAU * shift).cos());
-    let scale = 1.4 * flat(TAU * TAU * RADII[0] * RADII[1], count);
+    let scale = 1.1 * flat(TAU * TAU * RADII[0] * RADII[1], count);
     let center = middle + RADII[1] * normal;
     Made { center, normal, scale, opacity: 0.9, color: Vec3::from(hue), shine: 0.5 }
 }

@@ -164,7 +164,7 @@ impl Opened<'_> {
             let pass = Pass::new(vec![stream], &[], Context::default(), None, None)?;
             let mut all = Records::default();
             pass.run(|records| {
-                all.append(records);
+                all.join(records);
                 Ok(())
             })?;
             return Ok(Box::new(all));

@@ -171,9 +171,6 @@ impl<W: Watch> Work<'_, W> {
         let mut gathered: Option<AllGaussians> = None;
         // Trained scenes are edited together, and others before they become Gaussians.
         let together = self.are_gaussians()?;
-        if !together {
-            self.check_edits()?;
-        }
         for path in self.files {
             let one = self.gaussians_of(path, together)?;
             match &mut gathered {

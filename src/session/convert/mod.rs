@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `splats` | the splats of inputs, and the hierarchy of them |
 //! | `points` | points with attributes, and edits of points larger than memory |
+//! | `merged` | inputs of several formats as one cloud |
 //! | `regions` | scans larger than memory, region by region or in parts |
 //! | `gaussians` | trained Gaussians, and splats written as such |
 //! | `volume` | volumes as bricks and as NRRD |
@@ -14,6 +15,7 @@
 
 mod gaussians;
 mod memory;
+mod merged;
 mod points;
 mod regions;
 mod splats;

@@ -1,7 +1,7 @@
 //! Points with their attributes, and edits on the way of a conversion.
 //!
 //! Files of points that are read in pieces are edited together, in that way. Other inputs are read
-//! whole and edited one by one.
+//! whole, and edited one by one or as one cloud (`merged`).
 
 use super::{
     Converted, Watch, Work, memory, milliseconds,
@@ -17,7 +17,6 @@ use crate::{
     },
     hierarchy::external::memory_of_mesh,
     progress,
-    session::Data,
     surface::Mesh,
 };
 use glam::{DVec3, Vec3};
@@ -56,25 +55,20 @@ impl<W: Watch> Work<'_, W> {
 
     /// Writes the points of inputs that are read whole.
     fn points_of_surfaces(&self) -> Result<Converted, W::Error> {
-        self.check_edits()?;
         let (mut points, mut parts) = (0, Vec::new());
-        for path in self.files {
-            self.watch.stage(&format!("Reading {}", path.display()));
-            let reading = self.conversion.reading(Some(self.conversion.most_memory()));
-            let opened = reading.open_colored(path, self.conversion.attribute())?;
-            let data = opened.read()?.with_surface_of_bare_cells()?;
-            self.watch.has_read(&opened.files())?;
-            let Data::Mesh(mesh) = data else {
-                let message = "holds no mesh or point cloud, of which points are written; trained \
-                               Gaussians and hierarchies are written as .splk, .ply, .splat, .spz, \
-                               .sog or .glb";
-                return Err(wrong(format!("{} {message}", path.display())).into());
-            };
-            points += mesh.positions.len() as u64;
-            let names = mesh.about.attributes.clone();
-            let mut surface = self.surface(path, mesh, &names)?;
-            self.edit_surface(&mut surface, path)?;
-            parts.push(surface.into_records());
+        if self.comparing().is_some() {
+            let merged = self.merged(None, false)?;
+            points = merged.points;
+            parts.push(merged.records);
+        } else {
+            for path in self.files {
+                let mesh = self.mesh_of(path)?;
+                points += mesh.positions.len() as u64;
+                let names = mesh.about.attributes.clone();
+                let mut surface = self.surface(path, mesh, &names)?;
+                self.edit_surface(&mut surface, path)?;
+                parts.push(surface.into_records());
+            }
         }
         let mut layout = layout_of(&parts);
         let crs = self.conversion.edits.iter().rev().find_map(|edit| match edit {
@@ -118,12 +112,13 @@ impl<W: Watch> Work<'_, W> {
         Ok(Some(Pass::new(streams, &self.conversion.edits, context, names, watch)?))
     }
 
-    fn context(&self, file: &Path, up: DVec3, crs: String) -> Context {
+    pub fn context(&self, file: &Path, up: DVec3, crs: String) -> Context {
         Context { file: file.to_owned(), up, memory: self.conversion.most_memory(), crs }
     }
 
-    /// Returns the splats of points that are edited while they are read; `None` if there are no
-    /// edits, or for inputs that are not read in pieces.
+    /// Returns the splats of points that are edited together: while they are read, or else read
+    /// whole if an edit compares them. `None` if there are no edits, or for inputs that are edited
+    /// one by one.
     pub fn edited_points(&self) -> Result<Option<Gathered>, W::Error> {
         if self.conversion.edits.is_empty() {
             return Ok(None);
@@ -133,11 +128,22 @@ impl<W: Watch> Work<'_, W> {
         let watch = |done, all| self.watch.progress(READING, done, all);
         let named: Vec<String> =
             self.conversion.attribute().map(str::to_owned).into_iter().collect();
-        let Some(pass) = self.pass(limits, Some(&named), Some(&watch))? else { return Ok(None) };
-        let mut mesh = Mesh { origin: pass.middle(), ..Mesh::default() };
-        mesh.about = About { orientation: pass.orientation(), ..About::default() };
-        let changes = pass.run(|records| self.append(&mut mesh, records, named.first()))?;
-        self.watch.has_edited(&changes);
+        let mut mesh = Mesh::default();
+        match self.pass(limits, Some(&named), Some(&watch))? {
+            Some(pass) => {
+                mesh.origin = pass.middle();
+                mesh.about = About { orientation: pass.orientation(), ..About::default() };
+                let changes = pass.run(|records| self.append(&mut mesh, records, named.first()))?;
+                self.watch.has_edited(&changes);
+            }
+            None if self.comparing().is_some() && !self.are_gaussians()? => {
+                let merged = self.merged(Some(&named), true)?;
+                mesh.origin = merged.records.positions.first().copied().unwrap_or_default().round();
+                mesh.about = About { orientation: merged.orientation, ..About::default() };
+                self.append(&mut mesh, merged.records, named.first())?;
+            }
+            None => return Ok(None),
+        }
         let path = &self.files[0];
         let (read_ms, start) = (milliseconds(start), Instant::now());
         let (mesh, frame) = self.painted(path, mesh)?;
@@ -230,7 +236,7 @@ impl<W: Watch> Work<'_, W> {
     }
 
     /// Returns a mesh or point cloud with the attributes of these names.
-    fn surface(&self, path: &Path, mesh: Mesh, names: &[String]) -> Result<Surface, W::Error> {
+    pub fn surface(&self, path: &Path, mesh: Mesh, names: &[String]) -> Result<Surface, W::Error> {
         let count = mesh.positions.len();
         let mut surface = Surface::from(mesh);
         let reading = self.conversion.reading(Some(self.conversion.most_memory()));
@@ -250,15 +256,8 @@ impl<W: Watch> Work<'_, W> {
         if self.conversion.edits.is_empty() {
             return Ok(mesh);
         }
-        let wanted = |name: &&String| {
-            self.conversion.edits.iter().any(|edit| match edit {
-                Edit::Where(expression) => {
-                    expression.names().any(|wanted| wanted.eq_ignore_ascii_case(name))
-                }
-                _ => false,
-            })
-        };
-        let names: Vec<String> = mesh.about.attributes.iter().filter(wanted).cloned().collect();
+        let asked = mesh.about.attributes.iter().filter(|name| self.is_asked(name));
+        let names: Vec<String> = asked.cloned().collect();
         let mut surface = self.surface(path, mesh, &names)?;
         self.edit_surface(&mut surface, path)?;
         Ok(surface.mesh)
@@ -284,17 +283,6 @@ impl<W: Watch> Work<'_, W> {
         self.watch.stage(&format!("Editing {}", context.file.display()));
         self.watch.has_edited(&edit::apply(scene, &self.conversion.edits, context)?);
         Ok(())
-    }
-
-    /// Refuses edits of several inputs that would have to be one for them.
-    pub fn check_edits(&self) -> Result<()> {
-        let edit = self.conversion.edits.iter().find(|edit| !edit.is_local());
-        let (Some(edit), true) = (edit, self.files.len() > 1) else { return Ok(()) };
-        Err(wrong(format!(
-            "--{} compares the points of all inputs, which are merged first only if all are point \
-             clouds in binary PLY, LAS or LAZ, or trained Gaussians; convert the others one by one",
-            edit.name()
-        )))
     }
 }
 
@@ -351,7 +339,7 @@ fn layout_of(parts: &[Records]) -> PointLayout {
 
 /// Returns the narrowest type that holds values, because readers of whole files give all of them as
 /// 32-bit floats. So a class stays a byte.
-fn narrowest(values: &[f64]) -> NumberType {
+pub fn narrowest(values: &[f64]) -> NumberType {
     let is_within =
         |most: f64| values.iter().all(|value| value.fract() == 0.0 && (0.0..=most).contains(value));
     if is_within(255.0) {

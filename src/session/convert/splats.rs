@@ -137,7 +137,6 @@ impl<W: Watch> Work<'_, W> {
         if let Some(gathered) = self.edited_points()? {
             return Ok(gathered);
         }
-        self.check_edits()?;
         let mut gathered: Option<Gathered> = None;
         for path in self.files {
             let taken = gathered.as_ref().map_or(0, |all| memory_of_splats(all.set.splats.len()));

@@ -86,7 +86,7 @@ fn every_kind_is_edited_and_written() {
         ("cloud.splk", "--rotate x:90", "a.ply"),
         ("mesh.ply", "--scale 2", "c.splk"),
         ("trained.ply", "--thin 10% --rotate 1,2,3:40", "a.spz"),
-        ("trained.ply", "--where scale<0.05&&opacity>0.2", "d.splk"),
+        ("trained.ply", "--where scale<0.07&&opacity>0.2", "d.splk"),
         ("trained.ply", "--keep-cluster 1", "a.splat"),
     ] {
         folder.run(&format!("convert {input} -o {output} {edit}")).ok();
@@ -182,6 +182,24 @@ fn edited_pictures_are_those_of_edited_files() {
 }
 
 #[test]
+fn points_of_different_formats_are_thinned_together() {
+    let folder = Folder::new();
+    // A grid of 40 × 40 points, and nearly the same places without attributes.
+    folder.put("a.ply", cloud());
+    let rows: String =
+        (0..1600).map(|index| format!("{} {} 0.01\n", index % 40, index / 40)).collect();
+    folder.put("b.xyz", rows);
+    folder.run("convert a.ply b.xyz -o c.points.ply --thin 0.5 --where z<1").ok();
+    // Of two points at one place, one is kept.
+    assert_eq!(count(&folder, "c.points.ply"), 1600);
+    let text = std::fs::read(folder.path("c.points.ply")).unwrap();
+    let header = String::from_utf8_lossy(&text[..1000]).into_owned();
+    assert!(header.contains("intensity") && header.contains("classification"), "{header}");
+    folder.run("convert a.ply b.xyz -o c.splk --keep-cluster 1").ok();
+    assert!((3000..=3300).contains(&count(&folder, "c.splk")));
+}
+
+#[test]
 fn what_cannot_be_edited_is_told() {
     let folder = Folder::new();
     folder.put("a.ply", cloud());
@@ -193,7 +211,6 @@ fn what_cannot_be_edited_is_told() {
         ("convert a.ply -o b.las --crop 1,2,3", 2, &["sphere:X,Y,Z,RADIUS"]),
         ("convert a.nrrd -o b.nrrd --crop 0,0,0,1,1,1", 2, &["not for volumes"]),
         ("convert a.nrrd -o b.laz", 2, &["a.nrrd holds no mesh or point cloud"]),
-        ("convert mesh.ply -o b.splk --thin 50%", 2, &["a mesh is not thinned"]),
         ("convert mesh.ply a.ply -o b.splk --thin 50%", 2, &["--thin", "one by one"]),
         ("convert a.ply -o b.las --color height", 2, &["--color", "files of points"]),
         ("convert a.ply -o b.points.ply --lossless", 2, &["--lossless", ".points.ply"]),
