@@ -39,6 +39,16 @@ pub enum Error {
         limit: u64,
     },
 
+    /// A part of a file that comes in [`Parts`](crate::input::Parts) has not come yet. Hand it in,
+    /// and try again.
+    #[error("the bytes {start} to {end} of a file have not come yet")]
+    Absent {
+        /// The first byte.
+        start: u64,
+        /// The byte behind the last one.
+        end: u64,
+    },
+
     /// The operating system could not open, read or write a file.
     #[error("{}: cannot {action}: {source}", file.display())]
     File {

@@ -56,6 +56,9 @@ const STEPS: f64 = 16.0;
 /// volume's box nearest to the eye. Between two levels both are drawn, with weights that follow λ,
 /// so that zooming causes no popping. If they have more than [`Wish::most`] bricks, λ rises to the
 /// next sixteenth at which they do not. The coarsest level, of one brick, is always allowed.
+///
+/// Of a file in parts, the finest levels whose bricks have come are chosen, and those of the finer
+/// ones are asked for, coarse ones first.
 pub fn choice(
     bricks: &Bricks,
     view: &View,
@@ -68,19 +71,38 @@ pub fn choice(
     // A level's bricks do not depend on λ, so each level is searched once, when it is first needed.
     let mut known: Vec<Option<Vec<(f64, u32)>>> = vec![None; bricks.levels().len()];
     let mut lambda = wanted(bricks, view, pixels).max(least).min(coarsest);
-    let levels = loop {
+    let find = |level| visible(bricks, level, view, extent, first_visible, region);
+    let mut levels = loop {
         let levels = shares(lambda);
         let mut count = 0;
         for &(level, _) in &levels {
-            count += known[level]
-                .get_or_insert_with(|| visible(bricks, level, view, extent, first_visible, region))
-                .len();
+            count += known[level].get_or_insert_with(|| find(level)).len();
         }
         if count <= most || lambda >= coarsest {
             break levels;
         }
         lambda = ((lambda * STEPS).floor() + 1.0).min(coarsest * STEPS) / STEPS;
     };
+    if bricks.is_in_parts() {
+        let mut absent = Vec::new();
+        loop {
+            let mut wanted = Vec::new();
+            for &(level, _) in &levels {
+                let of_level = known[level].get_or_insert_with(|| find(level));
+                wanted.extend(of_level.iter().map(|&(_, brick)| (level, brick)));
+            }
+            if bricks.are_there(&wanted) {
+                break;
+            }
+            absent.push(wanted);
+            if lambda >= coarsest {
+                break;
+            }
+            lambda = (lambda.floor() + 1.0).min(coarsest);
+            levels = shares(lambda);
+        }
+        absent.iter().rev().for_each(|wanted| bricks.ask(wanted));
+    }
     let mut drawn: Vec<(f64, usize, u32)> = Vec::new();
     for &(level, _) in &levels {
         drawn.extend(

@@ -21,6 +21,7 @@ mod halve;
 mod level;
 #[cfg(feature = "zarr")]
 mod levels;
+mod parts;
 mod pyramid;
 mod store;
 #[cfg(test)]

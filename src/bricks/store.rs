@@ -26,6 +26,7 @@ use crate::{
     input::Source,
 };
 use std::{
+    ops::Range,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -229,7 +230,7 @@ impl Bricks {
         &self.more_channels
     }
 
-    fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
+    pub(super) fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
         let begun = bytes.begun(|bytes| begin(path, bytes, limits));
         let (header, directory) = begun.map_err(|error| bytes.why(path, error))?;
         let (path, limits) = (path.to_owned(), limits.clone());
@@ -371,6 +372,11 @@ impl Bricks {
                 })
             }
         }
+    }
+
+    /// Returns the bytes of the file that a brick takes.
+    pub(super) fn place(&self, level: usize, brick: u32) -> Result<Range<u64>> {
+        Ok(self.entry(level, brick)?.place.range())
     }
 
     fn entry(&self, level: usize, brick: u32) -> Result<Entry> {

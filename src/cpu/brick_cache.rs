@@ -99,9 +99,10 @@ impl BrickCache {
         }
         self.make_room((self.held.len() + absent.len()).saturating_sub(most));
         for keys in absent.chunks(BATCH) {
-            let read = self.bricks.read_all(keys)?;
-            self.reads += read.len() as u64;
+            let read = self.bricks.read_there(keys)?;
             for (key, brick) in keys.iter().zip(read) {
+                let Some(brick) = brick else { continue };
+                self.reads += 1;
                 let slot = self.free.pop().unwrap_or(self.blocks.len());
                 if slot == self.blocks.len() {
                     self.blocks.push(*brick.blocks);

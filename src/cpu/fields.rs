@@ -48,6 +48,8 @@ pub struct FieldState {
     visible_samples: Option<([u16; 256], VisibleBlocks)>,
     /// The levels of a gathered volume in bricks, for the bricks of the last picture.
     levels: Option<(Choice, Vec<(Grid, VisibleBlocks)>)>,
+    /// Whether parts of the file were missed when these levels were made.
+    is_partial: bool,
 }
 
 impl FieldState {
@@ -67,6 +69,7 @@ impl FieldState {
             shares: None,
             visible_samples: None,
             levels: None,
+            is_partial: false,
         }
     }
 
@@ -161,7 +164,8 @@ impl FieldState {
                     .get_or_insert_with(|| (first, VisibleBlocks::new(dims, ranges, &first)));
             }
             (Item::Bricks(..), Prepared::Bricks(cache), Some(choice))
-                if self.levels.as_ref().is_none_or(|(held, _)| held != choice) =>
+                if self.is_partial
+                    || self.levels.as_ref().is_none_or(|(held, _)| held != choice) =>
             {
                 let level = |(level, _): &(usize, f64)| {
                     (
@@ -170,6 +174,7 @@ impl FieldState {
                     )
                 };
                 self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
+                self.is_partial = cache.bricks.lacks();
             }
             _ => {}
         }

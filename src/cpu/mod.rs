@@ -205,6 +205,10 @@ impl CpuRenderer {
             return Err(Error::Stopped);
         }
         let (picture, mut stats) = drawn;
+        // Of files in parts, shadows may lack what comes later.
+        if self.scene.lacks() {
+            self.shadows.forget();
+        }
         if let Detail::Milliseconds(wanted) = settings.detail {
             self.pace.took(start.elapsed().as_secs_f64() * 1e3, wanted);
         }

@@ -13,6 +13,7 @@ use crate::{
     gaussians::Eye,
     hierarchy::{
         Cut, Hierarchy, SHARE_UNIT,
+        file::Page,
         needed::{self, needed},
     },
     math::{Pose, View},
@@ -98,14 +99,23 @@ impl PageCache {
         }
         self.missing = wanted.len() - most;
         wanted.truncate(most);
-        let mut needed: Vec<u32> = wanted.into_iter().map(|entry| entry.page).collect();
+        let order: Vec<u32> = wanted.into_iter().map(|entry| entry.page).collect();
+        let mut needed = order.clone();
         needed.sort_unstable();
         self.make_room(&needed, more, settings.controls.page_memory);
         for batch in absent.chunks(BATCH) {
-            let pages = self.hierarchy.read_pages(batch)?;
-            let held = |page| Held { nodes: Nodes::new(page), last_needed: self.frame };
-            let held: Vec<Held> = pages.par_iter().map(held).collect();
-            self.held.extend(batch.iter().copied().zip(held));
+            let pages = self.hierarchy.read_there(batch)?;
+            let held = |page: &Option<Page>| {
+                let nodes = Nodes::new(page.as_ref()?);
+                Some(Held { nodes, last_needed: self.frame })
+            };
+            let held: Vec<Option<Held>> = pages.par_iter().map(held).collect();
+            let held = batch.iter().zip(held).filter_map(|(page, held)| Some((*page, held?)));
+            self.held.extend(held);
+        }
+        if self.hierarchy.is_in_parts() {
+            needed = self.hierarchy.closed(order, |page| self.held.contains_key(&page))?;
+            needed.sort_unstable();
         }
         for page in &needed {
             if let Some(held) = self.held.get_mut(page) {

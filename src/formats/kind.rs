@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     Result,
-    input::{self, Bytes, Limits, Source, is_remote},
+    input::{self, Bytes, Limits, Parts, Source, is_remote},
 };
 use std::path::Path;
 
@@ -77,6 +77,19 @@ impl Kind {
         Ok(format.and_then(|format| match format.kind {
             Which::Always(kind @ (Self::Hierarchy | Self::Bricks)) => Some(kind),
             Which::Always(kind) if is_remote => Some(kind),
+            Which::Always(_) | Which::Rule(_) => None,
+        }))
+    }
+
+    /// Returns the kind of a file that comes in parts, by its first bytes, if it can be read in
+    /// parts.
+    ///
+    /// # Errors
+    /// [`Error::Absent`](crate::Error::Absent) until they have come.
+    pub(crate) fn of_parts(parts: &Parts) -> Result<Option<Self>> {
+        let format = by_magic(FORMATS, &Bytes::Parts(parts.clone()).beginning(0)?, |_| true);
+        Ok(format.and_then(|format| match format.kind {
+            Which::Always(kind @ (Self::Hierarchy | Self::Bricks)) => Some(kind),
             Which::Always(_) | Which::Rule(_) => None,
         }))
     }

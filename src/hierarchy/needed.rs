@@ -2,7 +2,7 @@
 
 use super::{
     Cut, CutSphere, Hierarchy,
-    file::{Page, PageEntry},
+    file::{Page, PageEntry, there},
 };
 use crate::{Result, parallel::prelude::*};
 use glam::Vec3;
@@ -106,7 +106,10 @@ impl All {
                 continue;
             }
             for above in summary.parents.clone().filter(|above| !self.holds[*above as usize]) {
-                rest.push((above, Summary::of(&hierarchy.entry(above)?)));
+                // The pages of a directory in parts that have not come yet list no page.
+                if let Some(entry) = there(hierarchy.entry(above))? {
+                    rest.push((above, Summary::of(&entry)));
+                }
             }
             self.nodes += u64::from(summary.nodes);
             self.pages.push((page, summary));

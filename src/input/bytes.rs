@@ -1,6 +1,7 @@
-//! The bytes of a file that is read in parts: a mapped file, bytes in memory, or a remote object.
+//! The bytes of a file that is read in parts: a mapped file, bytes in memory, a remote object, or
+//! parts that the program hands in.
 
-use super::{Limits, Mapping, address::is_remote, intact, remote::Remote, source::Source};
+use super::{Limits, Mapping, Parts, address::is_remote, intact, remote::Remote, source::Source};
 use crate::{Error, Result, error::LimitKind, memory};
 use std::{borrow::Cow, ops::Range, path::Path};
 
@@ -16,6 +17,7 @@ pub(crate) enum Bytes {
     Mapped(Mapping),
     Held(Vec<u8>),
     Remote(Remote),
+    Parts(Parts),
 }
 
 impl Bytes {
@@ -56,6 +58,7 @@ impl Bytes {
             Self::Mapped(map) => map.len() as u64,
             Self::Held(bytes) => bytes.len() as u64,
             Self::Remote(remote) => remote.len(),
+            Self::Parts(parts) => parts.len(),
         }
     }
 
@@ -73,6 +76,11 @@ impl Bytes {
                 }
                 memory::room("reading the beginning of an object", 2 * least)?;
                 Ok(Cow::Owned(remote.read(0..least)?.into()))
+            }
+            Self::Parts(parts) => {
+                let least = least.max(Parts::BLOCK).min(parts.len());
+                memory::room("reading the beginning of a file", 2 * least)?;
+                Ok(Cow::Owned(parts.read(0..least)?))
             }
         }
     }
@@ -95,6 +103,7 @@ impl Bytes {
             Self::Mapped(map) => Ok(Cow::Borrowed(&map[within()])),
             Self::Held(bytes) => Ok(Cow::Borrowed(&bytes[within()])),
             Self::Remote(remote) => Ok(Cow::Owned(remote.read(range)?.into())),
+            Self::Parts(parts) => Ok(Cow::Owned(parts.read(range)?)),
         }
     }
 
@@ -103,6 +112,10 @@ impl Bytes {
         match self {
             Self::Mapped(_) | Self::Held(_) => Ok(()),
             Self::Remote(remote) => remote.fetch(&ranges.collect::<Vec<_>>()),
+            Self::Parts(parts) => {
+                ranges.for_each(|range| parts.want(&range));
+                Ok(())
+            }
         }
     }
 
@@ -130,7 +143,19 @@ impl Bytes {
                 }
                 Ok(again.map_err(|message| format!("{message}, also when it is fetched again")))
             }
+            (Self::Parts(parts), Err(message)) => match parts.distrust(&range) {
+                true => Err(Error::Absent { start: range.start, end: range.end }),
+                false => Ok(Err(format!("{message}, also when it is fetched again"))),
+            },
             (_, result) => Ok(result),
+        }
+    }
+
+    /// Returns the parts of a file that comes in parts.
+    pub fn parts(&self) -> Option<&Parts> {
+        match self {
+            Self::Parts(parts) => Some(parts),
+            _ => None,
         }
     }
 
@@ -151,7 +176,7 @@ impl Bytes {
     pub fn why(&self, path: &Path, error: Error) -> Error {
         match self {
             Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
-            Self::Held(_) | Self::Remote(_) => error,
+            Self::Held(_) | Self::Remote(_) | Self::Parts(_) => error,
         }
     }
 }

@@ -7,6 +7,8 @@
 //! A path may also be the [`address`] of a remote object (`https`, `http`, `s3`, `gs`, `az`; with
 //! the feature `remote`). Hierarchies and volumes in bricks are fetched in ranges, as a picture
 //! needs them. Objects of other formats are fetched as a whole into the cache ([`remote`]).
+//!
+//! Programs that cannot wait for bytes, such as browsers, hand them in as [`Parts`].
 
 #![deny(clippy::disallowed_methods)]
 
@@ -21,6 +23,7 @@ pub(crate) mod isolate;
 mod limits;
 mod mapping;
 pub(crate) mod neighbour;
+mod parts;
 pub(crate) mod positions;
 #[cfg(feature = "remote")]
 pub mod remote;
@@ -44,6 +47,7 @@ pub(crate) use fingerprint::fingerprint;
 pub(crate) use folder::is_store;
 pub use limits::Limits;
 pub(crate) use mapping::Mapping;
+pub use parts::Parts;
 pub use source::Source;
 #[cfg(feature = "hdf5")]
 pub(crate) use source::Watch;

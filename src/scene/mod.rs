@@ -192,6 +192,16 @@ impl Scene {
         (0..self.items.len()).filter(has_field).collect()
     }
 
+    /// Returns whether the file of an item comes in parts, and some were missed since the picture
+    /// began.
+    pub(crate) fn lacks(&self) -> bool {
+        self.items.iter().any(|item| match item {
+            Item::Hierarchy(hierarchy) => hierarchy.lacks(),
+            Item::Bricks(bricks, ..) => bricks.lacks(),
+            _ => false,
+        })
+    }
+
     /// Returns the scene without its fields, except that of item `number`.
     pub(crate) fn with_one_field(&self, number: usize) -> Self {
         self.filtered(|index| index == number || self.items[index].transfer().is_none())

@@ -7,7 +7,11 @@ use crate::{
     cells::Tetrahedra,
     facet::FacetSet,
     gaussians::{Eye, Gaussians},
-    hierarchy::{Hierarchy, file::Page, needed::coarsest},
+    hierarchy::{
+        Hierarchy,
+        file::{Page, there},
+        needed::coarsest,
+    },
     math::hull::{Kind, outermost, without_strays},
     parallel::prelude::*,
     splat::{SampleSplats, Splat, Surfels, TRAINED_OPACITIES},
@@ -76,7 +80,7 @@ impl Scene {
                 Item::Cells(cells, transfer) => of_cells(cells, transfer, clips),
                 Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
                 Item::Bricks(bricks, _, transfer) => {
-                    of_volume(&bricks.volume(overview(bricks))?, transfer, clips)
+                    of_volume(&bricks.volume_there(overview(bricks))?, transfer, clips)
                 }
             };
             points.extend(outermost.into_iter().map(|point| pose.apply(point)));
@@ -226,18 +230,33 @@ fn of_cells(cells: &Tetrahedra, transfer: &TransferFunction, clips: &[Clip]) -> 
 
 /// Returns the leaves of a hierarchy, or, if it has many pages, the nodes of its coarse pages.
 fn coarse(hierarchy: &Hierarchy) -> Result<Surfels> {
-    if hierarchy.page_count() as usize <= MOST_PAGES {
-        return hierarchy.leaves();
+    if hierarchy.page_count() as usize <= MOST_PAGES
+        && let Some(leaves) = there(hierarchy.leaves())?
+    {
+        return Ok(leaves);
     }
     let read: Vec<u32> =
         coarsest(hierarchy, MOST_PAGES)?.into_iter().map(|needed| needed.page).collect();
-    let known: HashSet<u32> = read.iter().copied().collect();
-    let of_page = |page: &Page| {
+    let pages = hierarchy.read_there(&read)?;
+    let mut known: HashSet<u32> = read.iter().copied().collect();
+    let mut pages: Vec<(u32, Page)> =
+        read.iter().zip(pages).filter_map(|(number, page)| Some((*number, page?))).collect();
+    if hierarchy.is_in_parts() {
+        let are_there: HashSet<u32> = pages.iter().map(|(number, _)| *number).collect();
+        let closed = hierarchy.closed(read, |page| are_there.contains(&page))?;
+        known = closed.into_iter().collect();
+        pages.retain(|(number, _)| known.contains(number));
+    }
+    if pages.is_empty() {
+        // Not even the root has come.
+        hierarchy.read_page(0)?;
+    }
+    let of_page = |(_, page): &(u32, Page)| {
         let last = |at: &usize| !known.contains(&page.child_pages[*at]);
         let nodes = (0..page.nodes.len()).filter(last);
         nodes.map(|at| page.nodes[at].splat).collect::<Vec<Splat>>()
     };
-    let pages: Vec<Vec<Splat>> = hierarchy.read_pages(&read)?.par_iter().map(of_page).collect();
+    let pages: Vec<Vec<Splat>> = pages.par_iter().map(of_page).collect();
     let header = hierarchy.header();
     Ok(Surfels { origin: header.origin, splats: pages.concat(), extent: header.extent })
 }

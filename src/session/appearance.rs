@@ -233,7 +233,7 @@ impl<'a> Values<'a> {
 /// # Errors
 /// Those of reading bricks.
 pub(super) fn overview_of(bricks: &Bricks) -> Result<Volume> {
-    bricks.volume(overview(bricks))
+    bricks.volume_there(overview(bricks))
 }
 
 /// Returns the finest level of a volume that can be read quickly as a whole, or the coarsest level.

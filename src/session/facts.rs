@@ -87,6 +87,9 @@ impl Opened<'_> {
         if let Some(bytes) = self.held() {
             return Ok(bytes.len() as u64);
         }
+        if let Some(parts) = self.parts() {
+            return Ok(parts.len());
+        }
         // The objects of a store are not counted: there may be millions.
         if input::is_store(self.path()) {
             return Ok(0);

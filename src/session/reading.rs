@@ -10,7 +10,7 @@ use crate::{
         VolumeStream,
     },
     hierarchy::Hierarchy,
-    input::{Limits, Source},
+    input::{Limits, Parts, Source},
     volume::Volume,
 };
 use std::{
@@ -114,7 +114,8 @@ impl Reading {
     ) -> Result<Opened<'a>> {
         if let Some(kind @ (Kind::Hierarchy | Kind::Bricks)) = Kind::at_once(path, &self.limits)? {
             let source = None;
-            return Ok(Opened { reading: self, path, attribute, source, kind, is_raw: false });
+            let (is_raw, parts) = (false, None);
+            return Ok(Opened { reading: self, path, attribute, source, parts, kind, is_raw });
         }
         self.opened(Source::open_any(path, &self.whole)?, attribute)
     }
@@ -151,6 +152,23 @@ impl Reading {
         self.opened(Source::from_bytes(name, bytes, &self.whole)?, attribute)
     }
 
+    /// As [`open_bytes`](Self::open_bytes), for a hierarchy or a volume in bricks that comes in
+    /// parts.
+    ///
+    /// # Errors
+    /// [`Error::Absent`] until its beginning has come; [`Error::Input`] for other kinds of files.
+    pub(super) fn open_parts<'a>(&'a self, path: &'a Path, parts: &Parts) -> Result<Opened<'a>> {
+        let kind = match Kind::of_parts(parts)? {
+            Some(kind) => kind,
+            None => {
+                let message = "is neither a hierarchy (.splk) nor a volume in bricks (.splv)";
+                return Err(Error::input(path, "file", message).hint("hand it in as a whole"));
+            }
+        };
+        let (source, parts, attribute) = (None, Some(parts.clone()), None);
+        Ok(Opened { reading: self, path, attribute, source, parts, kind, is_raw: false })
+    }
+
     fn opened<'a>(&'a self, source: Source<'a>, attribute: Option<&'a str>) -> Result<Opened<'a>> {
         let path = source.path;
         let kind = match attribute {
@@ -165,7 +183,8 @@ impl Reading {
             None if self.options.raw.is_some() => (Kind::Volume, true),
             None => return Err(foreign(&source).unwrap_or_else(|| unknown(path))),
         };
-        Ok(Opened { reading: self, path, attribute, source: Some(source), kind, is_raw })
+        let (source, parts) = (Some(source), None);
+        Ok(Opened { reading: self, path, attribute, source, parts, kind, is_raw })
     }
 
     /// Returns the kind of an input, even if it is damaged, or larger than memory. An object on a
@@ -212,6 +231,8 @@ pub struct Opened<'a> {
     attribute: Option<&'a str>,
     /// None for files of hierarchies and bricks, which map or fetch parts.
     source: Option<Source<'a>>,
+    /// A file that comes in parts.
+    parts: Option<Parts>,
     kind: Kind,
     is_raw: bool,
 }
@@ -303,9 +324,10 @@ impl Opened<'_> {
     /// Opens a hierarchy.
     pub(super) fn hierarchy(&self) -> Result<Hierarchy> {
         let limits = &self.reading.limits;
-        match self.held() {
-            Some(bytes) => Hierarchy::from_bytes(bytes.to_vec(), self.path, limits),
-            None => Hierarchy::open(self.path, limits),
+        match (self.held(), &self.parts) {
+            (_, Some(parts)) => Hierarchy::from_parts(parts, self.path, limits),
+            (Some(bytes), _) => Hierarchy::from_bytes(bytes.to_vec(), self.path, limits),
+            (None, None) => Hierarchy::open(self.path, limits),
         }
     }
 
@@ -315,9 +337,11 @@ impl Opened<'_> {
         if let Some(source) = self.image_in_levels() {
             return Bricks::open_store(source, &self.reading.options);
         }
-        match self.held() {
-            Some(bytes) => Bricks::from_bytes(bytes.to_vec(), self.path),
-            None => Bricks::open(self.path, &self.reading.limits),
+        let limits = &self.reading.limits;
+        match (self.held(), &self.parts) {
+            (_, Some(parts)) => Bricks::from_parts(parts, self.path, limits),
+            (Some(bytes), _) => Bricks::from_bytes(bytes.to_vec(), self.path),
+            (None, None) => Bricks::open(self.path, limits),
         }
     }
 
@@ -328,6 +352,11 @@ impl Opened<'_> {
         let is_image =
             |source: &&Source| !source.held().is_some_and(|held| held.starts_with(b"SPLV"));
         self.source.as_ref().filter(|_| self.kind == Kind::Bricks).filter(is_image)
+    }
+
+    /// Returns the file, if it comes in parts.
+    pub(super) fn parts(&self) -> Option<&Parts> {
+        self.parts.as_ref()
     }
 
     /// Returns the bytes of the caller, if there is no file.

@@ -255,8 +255,9 @@ impl<K: Kind> Directory<K> {
     }
 
     /// Calls `each` with batches of entries, in the order of pages: all those whose directory pages
-    /// are present and have bounds that pass. `each` tests the bounds of entries themselves, and
-    /// returns whether to go on. `fail` makes an error of a fault.
+    /// are present and have bounds that pass. Of a file in parts, those that have not come yet are
+    /// left out. `each` tests the bounds of entries themselves, and returns whether to go on.
+    /// `fail` makes an error of a fault.
     pub fn visit<E>(
         &self,
         file: Option<&Bytes>,
@@ -271,14 +272,19 @@ impl<K: Kind> Directory<K> {
             if level == 0 {
                 let run = |number: &u32| self.run(file, number * RECORDS);
                 let runs: Vec<_> = numbers.par_iter().map(run).collect();
-                let runs: Result<Vec<_>, Fault> = runs.into_iter().collect();
+                let runs = runs.into_iter().filter(|run| !is_absent(run));
+                let runs: Result<Vec<_>, Fault> = runs.collect();
                 if !each(&runs.map_err(fail)?)? {
                     return Ok(());
                 }
                 continue;
             }
             for number in numbers.into_iter().rev() {
-                let below = self.below(file, level, number, wanted).map_err(fail)?;
+                let below = self.below(file, level, number, wanted);
+                if is_absent(&below) {
+                    continue;
+                }
+                let below = below.map_err(fail)?;
                 let batches = below.chunks(BATCH).rev();
                 rest.extend(batches.map(|batch| (level - 1, batch.to_vec())));
             }
@@ -437,6 +443,11 @@ impl<K: Kind> Directory<K> {
             Pages::Stored { read, .. } => read.lock().unwrap().len(),
         }
     }
+}
+
+/// Whether a directory page has not come yet, of a file in parts.
+fn is_absent<T>(result: &Result<T, Fault>) -> bool {
+    matches!(result, Err(Fault::Unread(Error::Absent { .. })))
 }
 
 fn name(level: usize, number: u32, place: Place) -> String {

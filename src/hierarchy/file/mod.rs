@@ -20,6 +20,7 @@ mod lossy;
 
 mod page;
 mod pages;
+mod parts;
 mod quantise;
 mod read;
 #[cfg(test)]
@@ -30,6 +31,7 @@ pub use check::check;
 #[doc(hidden)]
 pub use entry::PageEntry;
 pub use header::Header;
+pub(crate) use parts::there;
 pub use read::Hierarchy;
 #[doc(hidden)]
 pub use read::{CutSphere, NO_PAGE, Page};

@@ -160,7 +160,7 @@ impl Hierarchy {
         Self::new(name.as_ref(), Bytes::Held(bytes), limits)
     }
 
-    fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
+    pub(super) fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
         let begun = bytes.begun(|bytes| begin(path, bytes, limits));
         let begun = begun.map_err(|error| bytes.why(path, error))?;
         Ok(Self::assemble(path, Store::File(bytes.ready()), begun, limits.clone()))

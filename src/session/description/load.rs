@@ -6,6 +6,7 @@ use crate::{
     about::About,
     edit::Edit,
     formats::{Kind, Times},
+    input::Parts,
     math::Camera,
     memory,
     scene::{Item, Scene, Settings},
@@ -21,7 +22,11 @@ use std::{
 };
 
 /// Files in memory, by name.
-type Held = BTreeMap<PathBuf, Vec<u8>>;
+#[derive(Clone, Copy)]
+struct Held<'a> {
+    whole: &'a BTreeMap<PathBuf, Vec<u8>>,
+    in_parts: &'a BTreeMap<PathBuf, Parts>,
+}
 
 /// A scene that was read, and what is known of it.
 pub struct Loaded {
@@ -150,11 +155,29 @@ impl Description {
         files: &BTreeMap<PathBuf, Vec<u8>>,
         does: &dyn Fn(String),
     ) -> Result<Loaded> {
-        let (loaded, warnings) = warning::gathered(|| self.load_all(Some(files), does));
+        self.load_in_parts(files, &BTreeMap::new(), does)
+    }
+
+    /// As [`load_held`](Self::load_held), with hierarchies (`.splk`) and volumes in bricks (`.splv`)
+    /// that come in parts. The scene may be rough as long as one of them
+    /// [`lacks`](Parts::lacks) parts: coarse levels then decide the transfer function and what is
+    /// seen. Load it again once they have come.
+    ///
+    /// # Errors
+    /// Those of [`load_held`](Self::load_held); [`Error::Absent`] until the beginnings of the files
+    /// in parts have come.
+    pub fn load_in_parts(
+        &self,
+        whole: &BTreeMap<PathBuf, Vec<u8>>,
+        in_parts: &BTreeMap<PathBuf, Parts>,
+        does: &dyn Fn(String),
+    ) -> Result<Loaded> {
+        let held = Held { whole, in_parts };
+        let (loaded, warnings) = warning::gathered(|| self.load_all(Some(held), does));
         Ok(Loaded { warnings, ..loaded? })
     }
 
-    fn load_all(&self, held: Option<&Held>, does: &dyn Fn(String)) -> Result<Loaded> {
+    fn load_all(&self, held: Option<Held>, does: &dyn Fn(String)) -> Result<Loaded> {
         let checked = self.check();
         checked.map_err(|(place, message)| Error::Argument(format!("{place} {message}")))?;
         // One deadline covers reading all inputs and making their splats.
@@ -199,7 +222,7 @@ impl Description {
     fn add(
         &self,
         input: &InputEntry,
-        held: Option<&Held>,
+        held: Option<Held>,
         items: &mut Items,
         does: &dyn Fn(String),
     ) -> Result<(LoadedInput, Vec<PathBuf>)> {
@@ -223,14 +246,17 @@ impl Description {
         self.read_from(input, None)
     }
 
-    fn read_from(&self, input: &InputEntry, held: Option<&Held>) -> Result<ReadInput> {
+    fn read_from(&self, input: &InputEntry, held: Option<Held>) -> Result<ReadInput> {
         let (path, showing) = (&input.file, self.showing(input)?);
         let mut reading = self.reading_of(input).reading_within(memory::most());
         reading.options.channels = self.appearance_of(input).channels_read();
         let attribute = showing.coloring().attribute();
         let opened = match held {
             None => reading.open_colored(path, attribute)?,
-            Some(files) => reading.open_held(path, bytes_of(files, path)?, attribute)?,
+            Some(files) => match files.in_parts.get(path) {
+                Some(parts) => reading.open_parts(path, parts)?,
+                None => reading.open_held(path, files.bytes_of(path)?, attribute)?,
+            },
         };
         let mut data = opened.read()?;
         if let Some(glyphs) = &showing.glyphs {
@@ -280,12 +306,15 @@ impl Description {
     }
 }
 
-fn bytes_of<'a>(files: &'a Held, path: &Path) -> Result<&'a [u8]> {
-    files.get(path).map(Vec::as_slice).ok_or_else(|| {
-        let names: Vec<_> = files.keys().take(9).map(|name| name.display().to_string()).collect();
-        Error::input(path, "file", "is not among the files in memory")
-            .hint(format!("these are: {}", names.join(", ")))
-    })
+impl<'a> Held<'a> {
+    fn bytes_of(self, path: &Path) -> Result<&'a [u8]> {
+        self.whole.get(path).map(Vec::as_slice).ok_or_else(|| {
+            let names = self.whole.keys().chain(self.in_parts.keys()).take(9);
+            let names: Vec<_> = names.map(|name| name.display().to_string()).collect();
+            Error::input(path, "file", "is not among the files in memory")
+                .hint(format!("these are: {}", names.join(", ")))
+        })
+    }
 }
 
 impl Loaded {

@@ -15,6 +15,8 @@ mod kernel_file;
 mod length;
 mod light;
 mod load;
+#[cfg(test)]
+mod parts_tests;
 mod picture;
 mod reading;
 #[cfg(test)]

@@ -83,6 +83,9 @@ export const resources = {
   wasm: (hear) => fetched(new URL("./splatkit.wasm", import.meta.url), hear),
 };
 
+/** Files that are read in parts, as the view needs them. */
+const IN_PARTS = /\.spl[kv]$/i;
+
 const megabytes = (bytes) => `${(bytes / 1e6).toFixed(1)} MB`;
 
 export class SplatkitViewer extends HTMLElement {
@@ -105,6 +108,7 @@ export class SplatkitViewer extends HTMLElement {
   #opening = 0;
   #isOpen = false;
   #isExact = false;
+  #isFetching = false;
   #wheel = null;
   #size = [0, 0];
 
@@ -231,7 +235,8 @@ export class SplatkitViewer extends HTMLElement {
     return this.#canvas;
   }
 
-  /** Shows a scene: its description as in scene files, and its files as [name, ArrayBuffer]. */
+  /** Shows a scene: its description as in scene files, and its files as [name, ArrayBuffer], or as
+   *  [name, address] for hierarchies and bricks, which are read in parts. */
   async open(scene, files) {
     const opening = ++this.#opening;
     this.#say("Loading…");
@@ -247,8 +252,8 @@ export class SplatkitViewer extends HTMLElement {
       }
       const [width, height] = (this.#size = this.#wantedSize());
       const text = typeof scene === "string" ? scene : JSON.stringify(scene);
-      const buffers = [...files];
-      const moved = buffers.map(([, buffer]) => buffer);
+      const buffers = [...files].map(([name, file]) => [name, file instanceof ArrayBuffer ? file : new URL(file, document.baseURI).href]);
+      const moved = buffers.map(([, file]) => file).filter((file) => file instanceof ArrayBuffer);
       if (wasm) moved.push(wasm);
       this.#worker.postMessage({ type: "open", wasm, scene: text, files: buffers, width, height }, moved);
     } catch (error) {
@@ -267,6 +272,7 @@ export class SplatkitViewer extends HTMLElement {
     this.#worker?.terminate();
     this.#worker = null;
     this.#isOpen = false;
+    this.#isFetching = false;
   }
 
   async #openSource() {
@@ -275,8 +281,10 @@ export class SplatkitViewer extends HTMLElement {
     this.#problem.hidden = true;
     this.#say("Loading…");
     try {
-      const first = await fetched(address, (bytes, all) => this.#sayBytes(bytes, all));
       const name = decodeURIComponent(address.pathname.split("/").pop());
+      const hear = (bytes, all) => this.#sayBytes(bytes, all);
+      const taken = async (place) => (IN_PARTS.test(place.pathname) ? place.href : fetched(place, hear));
+      const first = await taken(address);
       let scene = { splatkit_scene: 2, inputs: [{ file: name }] };
       const files = [];
       if (/\.json$/i.test(name)) {
@@ -285,7 +293,7 @@ export class SplatkitViewer extends HTMLElement {
         for (const file of names) {
           const place = new URL(file.split("/").map(encodeURIComponent).join("/"), address);
           if (opening !== this.#opening) return;
-          files.push([file, await fetched(place, (bytes, all) => this.#sayBytes(bytes, all))]);
+          files.push([file, await taken(place)]);
         }
       } else {
         files.push([name, first]);
@@ -311,6 +319,8 @@ export class SplatkitViewer extends HTMLElement {
       this.#questions.delete(message.id);
     }
     if (message.type === "rest") this.#tell("rest");
+    if (message.type === "fetched") this.#hearFetched(message);
+    if (message.type === "transfers") this.#transfers = JSON.parse(message.transfers);
     if (message.type === "error") this.#complain(message.message, message.isFatal);
     if (message.type === "load") {
       this.#isOpen = true;
@@ -320,6 +330,14 @@ export class SplatkitViewer extends HTMLElement {
       this.#resize();
       this.#tell("load", { summary: message.summary, warnings: message.warnings });
     }
+  }
+
+  /** Parts of files have come. */
+  #hearFetched({ requests, bytes, cancelled, isBusy }) {
+    if (isBusy) this.#say(`Loading, ${megabytes(bytes)} so far`);
+    else this.#status.hidden = true;
+    this.#isFetching = isBusy;
+    this.#tell("fetched", { requests, bytes, cancelled, isBusy });
   }
 
   #show({ width, height, isExact, milliseconds, camera, buffer }) {
@@ -334,7 +352,7 @@ export class SplatkitViewer extends HTMLElement {
     } else {
       this.#scaled(pixels);
     }
-    this.#status.hidden = true;
+    this.#status.hidden = !this.#isFetching;
     this.#isExact = isExact;
     const isMoved = camera !== this.#cameraText;
     this.#cameraText = camera;

@@ -1,9 +1,17 @@
 // The worker that holds the engine: it hears the page, and draws strip by strip between messages.
 //
 // tools/web/build puts this behind the glue of wasm-bindgen, whose `initSync`, `Files` and `Viewer`
-// it uses.
+// it uses, and behind ranges.js.
 
 let viewer = null;
+/** What fetches files in parts. */
+let ranges = null;
+/** Counts the scenes that were opened. */
+let opening = 0;
+/** Whether the page knows that the view needs more than may be held. */
+let isFull = false;
+/** Whether the scene was read before all was there that it depends on. */
+let isRough = false;
 let isScheduled = false;
 /** Whether the page knows that nothing moves. */
 let isResting = true;
@@ -28,7 +36,10 @@ function complain(error) {
   const text = isTrap
     ? "The engine stopped: the scene may need more memory than a page can have. Reload the page to try again."
     : String(error?.message ?? error);
-  if (isTrap) viewer = null;
+  if (isTrap) {
+    viewer = null;
+    ranges?.close();
+  }
   postMessage({ type: "error", message: text, isFatal: isTrap || !viewer });
 }
 
@@ -49,7 +60,13 @@ function work() {
     }
     isResting = false;
     if (wait === -2) showFrame();
-    schedule(Math.max(wait, 0));
+    if (wait === -2 || wait === -3) fetchMore();
+    if (isRough && !viewer.is_rough()) {
+      isRough = false;
+      postMessage({ type: "transfers", transfers: viewer.transfers() });
+    }
+    // At −3, what comes wakes this.
+    if (wait !== -3) schedule(Math.max(wait, 0));
   } catch (error) {
     complain(error);
   }
@@ -65,22 +82,101 @@ function showFrame() {
   );
 }
 
+/** Says what is amiss while the picture stays. */
+function hint(message) {
+  postMessage({ type: "error", message, isFatal: false });
+}
+
+/** Fetches what the last frame lacks, and gives up the rest. */
+function fetchMore() {
+  if (!ranges) return;
+  ranges.want(viewer.requests());
+  const before = isFull;
+  isFull = viewer.is_full();
+  if (isFull && !before) {
+    const message = "This view needs more of the file than a page may hold, and is shown coarser. Come closer to see more.";
+    hint(message);
+  }
+}
+
+/** Says what was fetched so far. */
+function sayFetched() {
+  postMessage({ type: "fetched", ...ranges.sums, isBusy: ranges.isBusy });
+}
+
+/** Makes the viewer, and fetches what it needs to begin. */
+async function made(scene, held, size) {
+  for (;;) {
+    try {
+      return new Viewer(scene, held, ...size);
+    } catch (error) {
+      const wanted = held.requests();
+      if (wanted.length === 0 || error instanceof WebAssembly.RuntimeError) throw error;
+      await new Promise((done, fail) => {
+        ranges.hear = {
+          arrive: (file, start, bytes) => held.arrive(file, start, bytes),
+          problem: (message, isFinal) => (isFinal ? fail(new Error(message)) : hint(message)),
+          idle: done,
+        };
+        ranges.want(wanted);
+      });
+    }
+  }
+}
+
+/** Opens a scene. Files are buffers, or addresses of files that come in parts. */
+async function open({ scene, files, width, height }) {
+  const mine = ++opening;
+  ranges?.close();
+  viewer?.free();
+  viewer = null;
+  isFull = false;
+  drags.clear();
+  const held = new Files();
+  const fetching = new Ranges({ arrive() {}, problem: hint, idle() {} });
+  ranges = files.some(([, file]) => typeof file === "string") ? fetching : null;
+  for (const [name, file] of files) {
+    if (typeof file !== "string") {
+      held.add(name, new Uint8Array(file));
+      continue;
+    }
+    const { whole, size, bytes } = await fetching.open(file);
+    if (mine !== opening) return;
+    if (whole) held.add(name, new Uint8Array(whole));
+    else held.arrive(held.add_parts(name, size), 0, bytes);
+  }
+  const next = await made(scene, held, [width, height]);
+  if (mine !== opening) return next.free();
+  viewer = next;
+  fetching.hear = {
+    arrive(file, start, bytes) {
+      try {
+        viewer?.arrive(file, start, bytes);
+      } catch (error) {
+        complain(error);
+      }
+      sayFetched();
+      schedule();
+    },
+    problem: hint,
+    idle: sayFetched,
+  };
+  isRough = viewer.is_rough();
+  postMessage({
+    type: "load",
+    summary: viewer.summary(),
+    warnings: viewer.warnings(),
+    transfers: viewer.transfers(),
+  });
+  schedule();
+}
+
 /** What the page may ask for, by name. */
 const answers = {
-  open({ wasm, scene, files, width, height }) {
-    if (wasm) initSync({ module: wasm });
-    viewer?.free();
-    viewer = null;
-    drags.clear();
-    const held = new Files();
-    for (const [name, buffer] of files) held.add(name, new Uint8Array(buffer));
-    viewer = new Viewer(scene, held, width, height);
-    postMessage({
-      type: "load",
-      summary: viewer.summary(),
-      warnings: viewer.warnings(),
-      transfers: viewer.transfers(),
-    });
+  open(message) {
+    if (message.wasm) initSync({ module: message.wasm });
+    const mine = opening + 1;
+    open(message).catch((error) => mine === opening && complain(error));
   },
   drag({ kind, x, y }) {
     const [sumX, sumY] = drags.get(kind) ?? [0, 0];

@@ -1,19 +1,19 @@
 //! What JavaScript calls. Errors are texts for people.
 
-use crate::{Stage, Step};
+use crate::{MOST, Request, Stage, Step};
 use glam::{DVec2, DVec3};
 use splatkit::{
     Error,
+    input::Parts,
     session::{CameraEntry, ClipEntry, Side},
     volume::TransferFunction,
 };
-use std::{collections::BTreeMap, path::PathBuf};
 use wasm_bindgen::prelude::*;
 
 /// The files of a scene, by the names that the scene file gives them.
 #[wasm_bindgen]
 #[derive(Default)]
-pub struct Files(BTreeMap<PathBuf, Vec<u8>>);
+pub struct Files(crate::Files);
 
 #[wasm_bindgen]
 impl Files {
@@ -25,7 +25,22 @@ impl Files {
 
     /// Adds a file.
     pub fn add(&mut self, name: &str, bytes: Vec<u8>) {
-        self.0.insert(name.into(), bytes);
+        self.0.add(name, bytes);
+    }
+
+    /// Adds a file of `size` bytes that comes in parts. Returns its number.
+    pub fn add_parts(&mut self, name: &str, size: f64) -> usize {
+        self.0.add_parts(name, Parts::new(size as u64, MOST))
+    }
+
+    /// Hands in bytes of a file in parts.
+    pub fn arrive(&self, file: usize, start: f64, bytes: &[u8]) -> Result<(), JsError> {
+        self.0.arrive(file, start as u64, bytes).map_err(|error| told(&error))
+    }
+
+    /// See [`Viewer::requests`].
+    pub fn requests(&self) -> Vec<f64> {
+        flat(self.0.requests())
     }
 }
 
@@ -37,8 +52,9 @@ pub struct Viewer(Stage);
 impl Viewer {
     /// Opens a scene, for a picture of this many pixels.
     #[wasm_bindgen(constructor)]
-    pub fn new(scene: &str, files: Files, width: u32, height: u32) -> Result<Viewer, JsError> {
-        Stage::open(scene, &files.0, [width, height]).map(Self).map_err(|error| told(&error))
+    pub fn new(scene: &str, files: &Files, width: u32, height: u32) -> Result<Viewer, JsError> {
+        let stage = Stage::open(scene, files.0.clone(), [width, height]);
+        stage.map(Self).map_err(|error| told(&error))
     }
 
     /// What was said of the inputs while they were read.
@@ -52,14 +68,36 @@ impl Viewer {
     }
 
     /// Does the next part of the work. Returns the milliseconds to wait before the next one; −1 if
-    /// nothing is left to do, and −2 if there is a new frame.
+    /// nothing is left to do, −2 if there is a new frame, and −3 if parts have to come first.
     pub fn step(&mut self) -> Result<f64, JsError> {
         Ok(match self.0.step().map_err(|error| told(&error))? {
             Step::Rests => -1.0,
             Step::Shows => -2.0,
+            Step::Lacks => -3.0,
             Step::Works => 0.0,
             Step::Waits(milliseconds) => milliseconds,
         })
+    }
+
+    /// What to fetch of files in parts, the most important first: for each range the number of the
+    /// file, the first byte, and the byte behind the last one.
+    pub fn requests(&self) -> Vec<f64> {
+        flat(self.0.requests())
+    }
+
+    /// See [`Stage::arrive`].
+    pub fn arrive(&mut self, file: usize, start: f64, bytes: &[u8]) -> Result<(), JsError> {
+        self.0.arrive(file, start as u64, bytes).map_err(|error| told(&error))
+    }
+
+    /// See [`Stage::is_rough`].
+    pub fn is_rough(&self) -> bool {
+        self.0.is_rough()
+    }
+
+    /// See [`Stage::is_full`].
+    pub fn is_full(&self) -> bool {
+        self.0.is_full()
     }
 
     /// The pixels of the last frame: red, green, blue and opacity.
@@ -166,6 +204,12 @@ impl Viewer {
 
 fn parsed<T: serde::de::DeserializeOwned>(what: &str, json: &str) -> Result<T, JsError> {
     serde_json::from_str(json).map_err(|error| JsError::new(&format!("{what}: {error}")))
+}
+
+/// Returns requests as numbers.
+fn flat(requests: Vec<Request>) -> Vec<f64> {
+    let numbers = |(file, range): Request| [file as f64, range.start as f64, range.end as f64];
+    requests.into_iter().flat_map(numbers).collect()
 }
 
 /// Returns an error as a text, with its hint.

@@ -3,6 +3,8 @@
 
 #[cfg(target_arch = "wasm32")]
 mod bindings;
+mod files;
 mod stage;
 
+pub use files::{Files, MOST, Request};
 pub use stage::{Frame, Stage, Step};

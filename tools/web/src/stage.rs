@@ -3,6 +3,7 @@
 //! A page has one thread for this, which also hears the hand. So nothing here takes long, apart
 //! from opening the scene: fine frames are drawn in strips, and the hand is heard between them.
 
+use crate::{Files, Request};
 use glam::{DVec2, DVec3};
 use splatkit::{
     Device, Error, Renderer, Result,
@@ -13,7 +14,7 @@ use splatkit::{
     session::{CameraEntry, ClipEntry, Description, Drawing, Loaded, Side},
     volume::TransferFunction,
 };
-use std::{collections::BTreeMap, path::PathBuf};
+use std::collections::BTreeMap;
 use web_time::{Duration, Instant};
 
 /// The wanted time of a moving frame, in milliseconds.
@@ -29,6 +30,11 @@ const STRIPS: u32 = 6;
 /// Strips begin where blocks of tiles do.
 const ROWS: u32 = 32;
 
+/// While parts of files come, the picture is drawn again after these milliseconds at the earliest,
+/// and after this multiple of the time that it takes.
+const FRESH: f64 = 250.0;
+const PATIENCE: f64 = 3.0;
+
 /// What [`Stage::step`] has done.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Step {
@@ -40,6 +46,8 @@ pub enum Step {
     Works,
     /// There is a new frame. Call again.
     Shows,
+    /// Parts of files have to come first ([`Stage::requests`]). Call again then.
+    Lacks,
 }
 
 /// A frame that was drawn.
@@ -70,6 +78,10 @@ struct Work {
 /// A scene, and how it is seen.
 pub struct Stage {
     description: Description,
+    files: Files,
+    /// Whether parts were missed when the scene was read, and what of these has not come.
+    is_rough: bool,
+    rough: Vec<Request>,
     loaded: Loaded,
     renderer: Renderer,
     drawing: Drawing,
@@ -84,17 +96,24 @@ pub struct Stage {
     changed: Instant,
     work: Option<Work>,
     frame: Option<Frame>,
+    /// The effort of the last frame, if parts of files were missed, and when it was finished.
+    again: Option<(Effort, Instant)>,
+    /// Whether parts have come since the last frame began.
+    is_fed: bool,
+    /// The transfer functions that were set, by their fields.
+    transfers: BTreeMap<usize, TransferFunction>,
     /// The depth of the point where a drag began.
     grabbed: Option<f64>,
 }
 
 impl Stage {
-    /// Reads a scene file, and the inputs that it names, from memory. The picture has `size` pixels
-    /// instead of what the scene file says.
+    /// Reads a scene file, and the inputs that it names. The picture has `size` pixels instead of
+    /// what the scene file says.
     ///
     /// # Errors
-    /// Those of [`Description::parse`], of [`Description::load_held`] and of preparing the scene.
-    pub fn open(text: &str, files: &BTreeMap<PathBuf, Vec<u8>>, size: [u32; 2]) -> Result<Self> {
+    /// Those of [`Description::parse`], of [`Files::load`] and of preparing the scene. If one of
+    /// the files lacks parts then, fetch those and try again.
+    pub fn open(text: &str, files: Files, size: [u32; 2]) -> Result<Self> {
         let mut description = Description::parse(text)?;
         // A page shows one view, in pixels.
         let picture = &mut description.picture;
@@ -102,19 +121,22 @@ impl Stage {
         picture.views.clear();
         (picture.columns, picture.panel_labels) = (None, None);
         picture.size = Some(size.map(|side| side.max(1)));
-        let mut loaded = description.load_held(files, &|_| {})?;
-        let drawing = loaded.drawing(&description.picture)?;
+        files.begin(&[]);
+        let (loaded, drawing) = read(&description, &files)?;
         let framing = description.framing()?;
-        loaded.find_seen(&framing, &drawing.settings)?;
         let camera = framing.camera(&loaded.subject, drawing.free(0))?;
         let up = framing.orientation(&loaded.subject).0.up;
         let orbit = Orbit::new(camera, up, loaded.subject.bounds.diagonal());
         let renderer = Renderer::new(&Device::Cpu, &loaded.scene)?;
         let sheet = loaded.scene.finest_sheet();
         let (is_fitted, is_changed) = (description.camera.is_none(), true);
+        let (is_rough, rough) = (files.lack(), files.requests());
         Ok(Self {
             size: drawing_size(&description),
             description,
+            files,
+            is_rough,
+            rough,
             loaded,
             renderer,
             drawing,
@@ -126,8 +148,65 @@ impl Stage {
             changed: Instant::now(),
             work: None,
             frame: None,
+            again: None,
+            is_fed: false,
+            transfers: BTreeMap::new(),
             grabbed: None,
         })
+    }
+
+    /// Reads the scene again, with the parts that have come since: the transfer function and the
+    /// camera that is fitted then are as `splatkit render` has them.
+    fn read_again(&mut self) -> Result<()> {
+        self.files.begin(&[]);
+        let read = read(&self.description, &self.files);
+        let rough = self.files.requests();
+        if read.is_err() && !rough.is_empty() {
+            // Parts have left again.
+            self.rough = rough;
+            return Ok(());
+        }
+        (self.loaded, self.drawing) = read?;
+        (self.is_rough, self.rough) = (self.files.lack(), rough);
+        self.renderer = Renderer::new(&Device::Cpu, &self.loaded.scene)?;
+        self.sheet = self.loaded.scene.finest_sheet();
+        for (field, transfer) in std::mem::take(&mut self.transfers) {
+            self.set_transfer(field, &transfer)?;
+        }
+        if self.is_fitted {
+            self.fit(None)?;
+        }
+        self.touch();
+        Ok(())
+    }
+
+    /// Hands in bytes of a file in parts.
+    ///
+    /// # Errors
+    /// Those of [`Files::arrive`].
+    pub fn arrive(&mut self, file: usize, start: u64, bytes: &[u8]) -> Result<()> {
+        self.files.arrive(file, start, bytes)?;
+        self.is_fed = true;
+        let Self { files, rough, .. } = self;
+        rough.retain(|request| !files.have(request));
+        Ok(())
+    }
+
+    /// Returns what to fetch, the most important first.
+    pub fn requests(&self) -> Vec<Request> {
+        self.files.requests()
+    }
+
+    /// Returns whether the scene was read before all was there on which its transfer functions and
+    /// the camera that is fitted depend.
+    pub fn is_rough(&self) -> bool {
+        self.is_rough
+    }
+
+    /// Returns whether the view needs more of a file than may be held in memory. It is shown
+    /// coarser then.
+    pub fn is_full(&self) -> bool {
+        self.files.are_full()
     }
 
     /// Returns what was said of the inputs while they were read.
@@ -208,6 +287,7 @@ impl Stage {
             Error::Argument(format!("there is no field {field}: the scene has {}", fields.len()))
         })?;
         self.renderer.set_transfer(item, transfer)?;
+        self.transfers.insert(field, transfer.clone());
         self.touch();
         Ok(())
     }
@@ -220,6 +300,7 @@ impl Stage {
     /// Something changed: the last frame no longer shows it.
     fn touch(&mut self) {
         (self.is_changed, self.changed) = (true, Instant::now());
+        self.files.renew();
     }
 
     fn moved(&mut self) {
@@ -335,13 +416,21 @@ impl Stage {
     }
 
     fn next(&mut self) -> Result<Step> {
+        if self.is_rough && self.is_fed && self.rough.is_empty() && self.work.is_none() {
+            self.read_again()?;
+        }
         let is_new = std::mem::take(&mut self.is_changed);
         if is_new {
             self.work = None;
+            self.again = None;
             self.pace.changed();
         }
         if self.work.is_none() {
-            let Some(effort) = self.pace.next() else { return Ok(Step::Rests) };
+            if let Some(step) = self.awaits() {
+                return Ok(step);
+            }
+            let again = self.again.take().map(|(effort, _)| effort);
+            let Some(effort) = again.or_else(|| self.pace.next()) else { return Ok(Step::Rests) };
             let calm = self.changed.elapsed();
             if !is_new && calm < CALM {
                 return Ok(Step::Waits((CALM - calm).as_secs_f64() * 1e3));
@@ -351,8 +440,21 @@ impl Stage {
         self.draw_strip()
     }
 
+    /// Returns what to wait for, if parts of files have to come before the next frame.
+    fn awaits(&self) -> Option<Step> {
+        let (_, finished) = self.again?;
+        if !self.is_fed {
+            return Some(Step::Lacks);
+        }
+        let took = self.frame.as_ref().map_or(0.0, |frame| frame.milliseconds);
+        let wait = FRESH.max(PATIENCE * took) - finished.elapsed().as_secs_f64() * 1e3;
+        (wait > 0.0 && !self.files.requests().is_empty()).then_some(Step::Waits(wait))
+    }
+
     /// Begins a frame. One that moves is drawn at once.
     fn begin(&mut self, effort: Effort, moves: bool) -> Result<()> {
+        self.files.begin(&self.rough);
+        self.is_fed = false;
         let exact = &self.drawing.settings;
         let settings = effort.settings(exact, exact.sheet_thickness.or(self.sheet));
         let view = self.orbit.camera().view(settings.size)?;
@@ -392,14 +494,25 @@ impl Stage {
     fn finish(&mut self, work: Work) -> Result<Step> {
         let Work { effort, picture, milliseconds, .. } = work;
         self.pace.took(effort, milliseconds);
-        let (camera, is_exact) = (self.orbit.camera().clone(), effort == Effort::EXACT);
-        let picture = match is_exact {
+        let camera = self.orbit.camera().clone();
+        let lacks = self.is_rough || self.files.lack();
+        self.again = lacks.then(|| (effort, Instant::now()));
+        let is_exact = effort == Effort::EXACT && !lacks;
+        let picture = match effort == Effort::EXACT {
             true => self.drawing.reduced(picture, &self.loaded.items, &camera)?,
             false => picture,
         };
         self.frame = Some(Frame { picture, camera, is_exact, milliseconds });
         Ok(Step::Shows)
     }
+}
+
+/// Reads the inputs of a scene, and finds what is seen of it.
+fn read(description: &Description, files: &Files) -> Result<(Loaded, Drawing)> {
+    let mut loaded = files.load(description)?;
+    let drawing = loaded.drawing(&description.picture)?;
+    loaded.find_seen(&description.framing()?, &drawing.settings)?;
+    Ok((loaded, drawing))
 }
 
 /// Returns the size that a description gives its picture.

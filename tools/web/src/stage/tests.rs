@@ -2,6 +2,7 @@
 
 use super::*;
 use splatkit::compare::compare_pictures;
+use std::path::PathBuf;
 
 const SIZE: [u32; 2] = [96, 72];
 
@@ -17,11 +18,17 @@ fn stage() -> (Stage, Description, BTreeMap<PathBuf, Vec<u8>>) {
     let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "ball.xyz"}], "picture":
         {"size": [9, 9], "views": ["front", "left"], "samples": 1, "background": "white"}}"#;
     let files = BTreeMap::from([("ball.xyz".into(), points.into_bytes())]);
-    let stage = Stage::open(text, &files, SIZE).expect("a scene");
+    let stage = Stage::open(text, held(&files), SIZE).expect("a scene");
     let mut scene = Description::parse(text).expect("a scene");
     scene.picture.views.clear();
     scene.picture.size = Some(SIZE);
     (stage, scene, files)
+}
+
+fn held(files: &BTreeMap<PathBuf, Vec<u8>>) -> Files {
+    let mut held = Files::default();
+    files.iter().for_each(|(name, bytes)| held.add(name, bytes.clone()));
+    held
 }
 
 /// Draws until nothing is left to do. Returns how often there was a new frame.
@@ -36,6 +43,7 @@ fn rest(stage: &mut Stage) -> usize {
                 std::thread::sleep(Duration::from_secs_f64(milliseconds / 1e3));
             }
             Step::Works => {}
+            Step::Lacks => panic!("nothing comes in parts"),
         }
     }
 }
@@ -94,7 +102,7 @@ fn what_cannot_be_is_an_error_and_changes_nothing() {
     assert!(stage.pixels() == before);
     let missing = Stage::open(
         r#"{"splatkit_scene": 2, "inputs": [{"file": "b.xyz"}]}"#,
-        &BTreeMap::from([("a.xyz".into(), b"0 0 0\n".to_vec())]),
+        held(&BTreeMap::from([("a.xyz".into(), b"0 0 0\n".to_vec())])),
         SIZE,
     );
     let error = missing.err().expect("a file that is not there").to_string();
@@ -111,7 +119,7 @@ fn a_label_map_moves() {
     let mut labels = format!("{header}{segments}").into_bytes();
     labels.extend((0..512u32).map(|at| (at % 8 / 4 + 1) as u8));
     let files = BTreeMap::from([("a.seg.nrrd".into(), labels)]);
-    let mut stage = Stage::open(text, &files, SIZE).expect("a label map");
+    let mut stage = Stage::open(text, held(&files), SIZE).expect("a label map");
     assert!(rest(&mut stage) >= 1);
     stage.turn(DVec2::new(9.0, 0.0));
     assert!(rest(&mut stage) >= 1 && stage.frame().is_some_and(|frame| frame.is_exact));

@@ -1,0 +1,206 @@
+//! Tests of scenes whose files come in parts.
+
+use super::Description;
+use crate::{
+    Device, Error, Renderer, Result, bricks,
+    hierarchy::{
+        file::{WriteOptions, to_bytes},
+        testing::{joined, surface},
+    },
+    input::{Parts, testing::Folder},
+    picture::Picture,
+    scene::Settings,
+    session::Loaded,
+    volume::phantoms::Phantom,
+};
+use std::collections::BTreeMap;
+
+/// The bytes of the first request of a viewer.
+const FIRST: usize = 4 << 16;
+
+/// A hierarchy with a directory of several levels.
+fn hierarchy() -> (&'static str, Vec<u8>) {
+    let mut splats = surface(20_000, 3);
+    splats.iter_mut().for_each(|splat| splat.center[0] *= 4.0);
+    let bytes = to_bytes(&joined(&splats, 2_000), &WriteOptions::default()).expect("a file");
+    ("a.splk", bytes)
+}
+
+fn volume() -> (&'static str, Vec<u8>) {
+    let volume = Phantom::Head.sample_bytes([150; 3]).expect("a volume");
+    let folder = Folder::new();
+    let path = folder.path("a.splv");
+    bricks::write(&volume, &path, &bricks::WriteOptions::default(), &()).expect("a file");
+    ("a.splv", std::fs::read(path).expect("a file"))
+}
+
+/// A scene of one file, close enough that the view needs only a part of it.
+fn scene(name: &str, more: &str) -> Description {
+    let text = format!(
+        r#"{{"splatkit_scene": 2, "inputs": [{{"file": "{name}"}}], "framing": {{"zoom": 2}},
+            "picture": {{"size": [160, 120], "samples": 1 {more}}}}}"#
+    );
+    Description::parse(&text).expect("a scene")
+}
+
+/// Hands in bytes of a file, and counts them.
+struct Server<'a> {
+    bytes: &'a [u8],
+    parts: Parts,
+    sent: usize,
+    /// How often the byte in the middle is sent wrong.
+    wrong: usize,
+}
+
+impl<'a> Server<'a> {
+    fn new(bytes: &'a [u8], most: u64) -> Self {
+        let mut server =
+            Self { bytes, parts: Parts::new(bytes.len() as u64, most), sent: 0, wrong: 0 };
+        server.send(0..FIRST.min(bytes.len()));
+        server
+    }
+
+    fn send(&mut self, range: std::ops::Range<usize>) {
+        let mut part = self.bytes[range.clone()].to_vec();
+        let middle = self.bytes.len() / 2;
+        if range.contains(&middle) && self.wrong > 0 {
+            self.wrong -= 1;
+            part[middle - range.start] ^= 1;
+        }
+        self.sent += part.len();
+        self.parts.arrive(range.start as u64, &part).expect("blocks");
+    }
+
+    /// Answers the most important requests.
+    fn answer(&mut self, count: usize) {
+        let requests = self.parts.requests();
+        assert!(!requests.is_empty(), "what is missed is asked for");
+        for range in requests.into_iter().take(count) {
+            self.send(range.start as usize..range.end as usize);
+        }
+    }
+}
+
+/// What a viewer shows of a file in parts.
+struct Shown {
+    last: Picture,
+    /// The bytes that were sent before the first picture, and in all.
+    first: usize,
+    all: usize,
+    /// Pictures that were not exact.
+    rough: usize,
+    most: u64,
+}
+
+/// Reads the scene, and finds what is seen.
+fn read(scene: &Description, parts: &Parts) -> Result<(Loaded, Settings)> {
+    let files = BTreeMap::from([(scene.inputs[0].file.clone(), parts.clone())]);
+    let mut loaded = scene.load_in_parts(&BTreeMap::new(), &files, &|_| {})?;
+    let settings = loaded.drawing(&scene.picture)?.settings;
+    loaded.find_seen(&scene.framing()?, &settings)?;
+    Ok((loaded, settings))
+}
+
+/// Draws a scene as its parts come, until the picture is exact.
+fn shown(scene: &Description, server: &mut Server) -> Result<Shown> {
+    let parts = server.parts.clone();
+    let (mut first, mut rough, mut most) = (None, 0, 0);
+    for _ in 0..500 {
+        parts.renew();
+        parts.begin();
+        let (loaded, settings) = match read(scene, &parts) {
+            Err(Error::Absent { .. }) => {
+                server.answer(usize::MAX);
+                continue;
+            }
+            read => read?,
+        };
+        if parts.lacks() && first.is_some() {
+            server.answer(usize::MAX);
+            continue;
+        }
+        let is_rough = parts.lacks();
+        let camera = scene.framing()?.camera(&loaded.subject, 1.0)?;
+        let mut renderer = Renderer::new(&Device::Cpu, &loaded.scene)?;
+        for _ in 0..500 {
+            let last = renderer.render(&camera, &settings)?.0;
+            first.get_or_insert(server.sent);
+            most = most.max(parts.held());
+            if !parts.lacks() {
+                let (all, first) = (server.sent, first.unwrap_or_default());
+                return Ok(Shown { last, first, all, rough, most });
+            }
+            rough += 1;
+            server.answer(2);
+            if is_rough {
+                break;
+            }
+            parts.begin();
+        }
+    }
+    panic!("the picture never becomes exact");
+}
+
+/// The picture of the whole file.
+fn whole(scene: &Description, bytes: &[u8]) -> Picture {
+    let files = BTreeMap::from([(scene.inputs[0].file.clone(), bytes.to_vec())]);
+    let mut loaded = scene.load_held(&files, &|_| {}).expect("a scene");
+    let settings = loaded.drawing(&scene.picture).expect("settings").settings;
+    let framing = scene.framing().expect("a framing");
+    loaded.find_seen(&framing, &settings).expect("what is seen");
+    let camera = framing.camera(&loaded.subject, 1.0).expect("a camera");
+    let mut renderer = Renderer::new(&Device::Cpu, &loaded.scene).expect("a renderer");
+    renderer.render(&camera, &settings).expect("a picture").0
+}
+
+fn is_same(a: &Picture, b: &Picture) -> bool {
+    let bits = |picture: &Picture| -> Vec<u32> {
+        let color = picture.color.iter().flatten().map(|value| value.to_bits());
+        color.chain(picture.depth.iter().map(|value| value.to_bits())).collect()
+    };
+    bits(a) == bits(b)
+}
+
+#[test]
+fn parts_come_to_the_picture_of_the_whole_file() {
+    let lit = r#", "light": "key""#;
+    let most = 1 << 20;
+    for ((name, bytes), more) in
+        [hierarchy(), volume()].into_iter().flat_map(|file| [(file.clone(), ""), (file, lit)])
+    {
+        let scene = scene(name, more);
+        let mut server = Server::new(&bytes, most);
+        let shown = shown(&scene, &mut server).expect("a picture");
+        assert!(is_same(&shown.last, &whole(&scene, &bytes)), "{name}: another picture");
+        let Shown { first, all, rough, most: held, .. } = shown;
+        let told = format!("{name}: {first} of {all} of {} bytes, {rough} rough", bytes.len());
+        assert!(rough >= 2 && first < all && first <= 1 << 20, "{told}");
+        assert!(held <= most, "{told}, {held} held");
+    }
+}
+
+#[test]
+fn wrong_bytes_are_fetched_again_once() {
+    for (name, bytes) in [hierarchy(), volume()] {
+        let scene = scene(name, "");
+        let mut server = Server::new(&bytes, 1 << 30);
+        server.wrong = 1;
+        let shown_once = shown(&scene, &mut server).expect("a picture");
+        assert!(is_same(&shown_once.last, &whole(&scene, &bytes)), "{name}");
+        assert_eq!(server.wrong, 0, "{name}: the middle of the file was not needed");
+        let mut server = Server::new(&bytes, 1 << 30);
+        server.wrong = 9;
+        let message = shown(&scene, &mut server).err().expect("damage").to_string();
+        assert!(message.contains("also when it is fetched again"), "{message}");
+        assert!(message.contains(name), "{message}");
+    }
+}
+
+#[test]
+fn other_files_are_refused() {
+    let scene = scene("a.splk", "");
+    let bytes = b"ply\nformat ascii 1.0\n".repeat(9);
+    let server = Server::new(&bytes, 1 << 20);
+    let error = read(&scene, &server.parts).err().expect("another file").to_string();
+    assert!(error.contains("neither a hierarchy (.splk) nor a volume"), "{error}");
+}
