@@ -6,7 +6,7 @@
 // Pictures that are worth a look stay in WORK.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawnSync } from "node:child_process";
+import { execFileSync, spawn, spawnSync } from "node:child_process";
 import fs from "node:fs";
 import http from "node:http";
 import { createRequire } from "node:module";
@@ -65,7 +65,7 @@ async function opened(address, options = {}) {
   page.on("pageerror", (error) => page.faults.push(error.message));
   await page.addInitScript(() => {
     window.heard = [];
-    for (const name of ["load", "frame", "rest", "error", "camerachange"]) {
+    for (const name of ["load", "frame", "rest", "error", "camerachange", "fetched"]) {
       document.addEventListener(
         name,
         (event) => event.target.localName === "splatkit-viewer" && heard.push({ name, ...event.detail, at: performance.now() }),
@@ -170,17 +170,46 @@ tests["a hand"] = async () => {
   return `${moving.length} moving frames of ${Math.round(times[times.length >> 1])} ms`;
 };
 
-/** Serves a folder. */
-function served(folder) {
-  const kinds = { html: "text/html", js: "text/javascript", wasm: "application/wasm", json: "application/json" };
+const KINDS = { html: "text/html", js: "text/javascript", wasm: "application/wasm", json: "application/json", css: "text/css" };
+/** A policy that compiles WebAssembly, and makes no programs of texts. */
+const POLICY = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; connect-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:";
+
+/** Answers with the part of a file that a request asks for. */
+function sendPart(request, response, file, given) {
+  const { size, mtimeMs } = fs.statSync(file);
+  const tag = `"${size}-${mtimeMs}"`;
+  response.setHeader("etag", tag);
+  const wanted = request.headers["if-match"];
+  if (wanted && wanted !== tag) return response.writeHead(412).end();
+  const [start, end] = [Number(given[1]), Math.min(Number(given[2]) + 1, size)];
+  if (start >= size) return response.writeHead(416).end();
+  response.writeHead(206, { "content-range": `bytes ${start}-${end - 1}/${size}`, "content-length": end - start });
+  fs.createReadStream(file, { start, end: end - 1 }).pipe(response);
+}
+
+/** Serves folders, the first that has a file. `answers` may answer before: it returns whether it
+ *  has. With `ranges`, requests for parts are answered. `log` has each of those. */
+function served(folders, { answers, ranges = false, policy } = {}) {
+  const log = [];
   const server = http.createServer((request, response) => {
-    const file = path.join(folder, decodeURIComponent(new URL(request.url, "http://a").pathname));
-    const whole = file.endsWith("/") ? `${file}index.html` : file;
-    if (!fs.existsSync(whole)) return response.writeHead(404).end();
-    response.writeHead(200, { "content-type": kinds[whole.split(".").pop()] ?? "application/octet-stream" });
-    fs.createReadStream(whole).pipe(response);
+    const name = decodeURIComponent(new URL(request.url, "http://a").pathname);
+    const places = [folders].flat().map((folder) => path.join(folder, name.endsWith("/") ? `${name}index.html` : name));
+    const whole = places.find((place) => fs.existsSync(place));
+    if (policy) response.setHeader("content-security-policy", policy);
+    const given = ranges && /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? "");
+    if (given && whole) log.push({ name, start: Number(given[1]), end: Number(given[2]) + 1 });
+    if (answers?.(request, response, whole)) return;
+    if (!whole) return response.writeHead(404).end();
+    response.setHeader("content-type", KINDS[whole.split(".").pop()] ?? "application/octet-stream");
+    if (!given) {
+      response.writeHead(200);
+      return fs.createReadStream(whole).pipe(response);
+    }
+    sendPart(request, response, whole, given);
   });
-  return new Promise((answer) => server.listen(0, "127.0.0.1", () => answer(server)));
+  return new Promise((answer) =>
+    server.listen(0, "127.0.0.1", () => answer(Object.assign(server, { log, address: `http://127.0.0.1:${server.address().port}/` }))),
+  );
 }
 
 tests["a folder"] = async () => {
@@ -189,8 +218,7 @@ tests["a folder"] = async () => {
   run("publish", ...look, "-o", "site", "--viewer", viewer);
   run("render", ...look, "--size", SIZE.join("x"), "--engine", "cpu", "-o", "site-native.png", "--overwrite");
   const server = await served(at("site"));
-  const address = `http://127.0.0.1:${server.address().port}/`;
-  const page = await opened(address);
+  const page = await opened(server.address);
   ended(await rested(page));
   await saved(page, "site-page.png");
   assert.deepEqual(page.faults.filter((fault) => !fault.includes("favicon")), []);
@@ -206,6 +234,282 @@ tests["a folder"] = async () => {
   await page.context().close();
   server.close();
   return `${alike} dB`;
+};
+
+const look = ["--background", "#10141c"];
+/** Points of the cloud, and samples of the volume along each axis, that are read in ranges. */
+const POINTS = Number(process.env.POINTS ?? 600_000);
+const SIDE = Number(process.env.SAMPLES ?? 224);
+
+/** Makes a cloud and a volume that are large enough to be read in parts. */
+function makeLarge() {
+  fs.mkdirSync(at("large"), { recursive: true });
+  if (!fs.existsSync(at(`large/cloud-${POINTS}.splk`))) {
+    const bytes = Buffer.alloc(15 * POINTS);
+    for (let i = 0; i < POINTS; i++) {
+      const [turn, height] = [i * 2.399963, 1 - (2 * i + 1) / POINTS];
+      const ring = Math.sqrt(1 - height * height);
+      const far = 1 + 0.1 * Math.sin(9 * height) * Math.cos(5 * turn) + 0.02 * Math.sin(61 * height);
+      [ring * Math.cos(turn), ring * Math.sin(turn), height].forEach((v, axis) => bytes.writeFloatLE(v * far, 15 * i + 4 * axis));
+      bytes.set([128 + 100 * Math.sin(7 * height), 128 + 90 * Math.cos(3 * turn), (i * 7919) % 256], 15 * i + 12);
+    }
+    const header = `ply\nformat binary_little_endian 1.0\nelement vertex ${POINTS}\n${["x", "y", "z"].map((n) => `property float ${n}\n`).join("")}${["red", "green", "blue"].map((n) => `property uchar ${n}\n`).join("")}end_header\n`;
+    fs.writeFileSync(at("large/cloud.ply"), Buffer.concat([Buffer.from(header), bytes]));
+    run("convert", "large/cloud.ply", "-o", `large/cloud-${POINTS}.splk`);
+  }
+  if (!fs.existsSync(at(`large/field-${SIDE}.splv`))) {
+    const bytes = Buffer.alloc(SIDE ** 3);
+    for (let z = 0, i = 0; z < SIDE; z++)
+      for (let y = 0; y < SIDE; y++)
+        for (let x = 0; x < SIDE; x++, i++) {
+          const [a, b, c] = [x, y, z].map((v) => (2 * v) / SIDE - 1);
+          const body = 1 - Math.hypot(a, b, c) + 0.25 * Math.sin(9 * a) * Math.sin(8 * b) * Math.sin(7 * c);
+          bytes[i] = Math.max(0, Math.min(255, 180 * body + 6 * (((i * 2654435761) >>> 16) % 16) / 16));
+        }
+    const header = `NRRD0004\ntype: uint8\ndimension: 3\nsizes: ${SIDE} ${SIDE} ${SIDE}\nencoding: raw\n\n`;
+    fs.writeFileSync(at("large/field.nrrd"), Buffer.concat([Buffer.from(header), bytes]));
+    run("convert", "large/field.nrrd", "-o", `large/field-${SIDE}.splv`);
+  }
+  const page = (file) =>
+    `<!doctype html><html><head><meta charset="utf-8"><link rel="icon" href="data:,"><style>html,body{margin:0;height:100%;background:#10141c}splatkit-viewer{position:fixed;inset:0}</style></head><body><splatkit-viewer src="${file}"></splatkit-viewer><script type="module" src="splatkit-viewer.js"></script></body></html>`;
+  const files = { cloud: `cloud-${POINTS}.splk`, field: `field-${SIDE}.splv` };
+  for (const [name, file] of Object.entries(files)) {
+    const scene = { splatkit_scene: 2, inputs: [{ file }], picture: { background: "#10141c" } };
+    fs.writeFileSync(at(`large/${name}.json`), JSON.stringify(scene));
+    fs.writeFileSync(at(`large/${name}.html`), page(`${name}.json`));
+  }
+  return files;
+}
+
+/** Serves the large files with the viewer. */
+const largeServed = (options) => served([at("large"), viewer], { ranges: true, ...options });
+
+/** Waits until a frame is shown. */
+const firstFrame = (page) => page.waitForFunction(() => heard.some(({ name }) => name === "frame" || name === "error"), null, { timeout: PATIENCE });
+
+for (const kind of ["cloud", "field"]) {
+  tests[`${kind} in ranges`] = async () => {
+    const file = makeLarge()[kind];
+    run("render", `large/${file}`, ...look, "--size", SIZE.join("x"), "--engine", "cpu", "-o", `${kind}-native.png`, "--overwrite");
+    const server = await largeServed();
+    const page = await opened(`${server.address}${kind}.html`);
+    await firstFrame(page);
+    await page.screenshot({ path: at(`${kind}-first.png`) });
+    const events = await rested(page);
+    const frames = ended(events);
+    await saved(page, `${kind}-ranges.png`);
+    assert.deepEqual(page.faults, []);
+    const alike = likeness(`${kind}-ranges.png`, `${kind}-native.png`);
+    assert.ok(alike >= LEAST, `the page shows another picture than render: ${alike} dB`);
+    const before = events.slice(0, events.indexOf(frames[0])).filter(({ name }) => name === "fetched").at(-1);
+    const { size } = fs.statSync(at(`large/${file}`));
+    const all = server.log.reduce((sum, { start, end }) => sum + Math.min(end, size) - start, 0);
+    assert.ok(before.bytes <= 1 << 20, `${before.bytes} bytes before the first picture`);
+    // Far away, a part is enough; and nothing comes twice.
+    assert.ok(server.log.length > 3 && all <= 1.05 * size, `${server.log.length} requests of ${all} bytes`);
+    // The same as from the whole file.
+    run("publish", `large/${file}`, ...look, "-o", `${kind}-whole.html`, "--overwrite", "--viewer", viewer);
+    const whole = await opened(`file://${at(`${kind}-whole.html`)}`);
+    ended(await rested(whole));
+    await saved(whole, `${kind}-whole.png`);
+    assert.equal(likeness(`${kind}-ranges.png`, `${kind}-whole.png`), Infinity);
+    await whole.context().close();
+    // Closer: more parts come, and the picture is exact again.
+    const far = server.log.length;
+    await page.mouse.move(300, 220);
+    for (let step = 0; step < 5; step++) await page.mouse.wheel(0, -200);
+    ended(await rested(page));
+    await page.screenshot({ path: at(`${kind}-close.png`) });
+    const close = server.log.length - far;
+    await page.context().close();
+    server.close();
+    const [first, last] = [frames[0].at, frames.at(-1).at].map((time) => (time / 1000).toFixed(1));
+    return `${alike} dB, ${(size / 1e6).toFixed(1)} MB, first ${first} s after ${(before.bytes / 1e6).toFixed(2)} MB, exact ${last} s after ${(all / 1e6).toFixed(1)} MB in ${far} requests, ${close} closer`;
+  };
+}
+
+tests["a view that moves on"] = async () => {
+  makeLarge();
+  // A slow line: requests for parts take a while.
+  let given = 0;
+  const server = await largeServed({
+    answers(request, response, file) {
+      const part = file && /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? "");
+      if (!part || part[1] === "0") return false;
+      const timer = setTimeout(() => sendPart(request, response, file, part), 700);
+      response.on("close", () => {
+        clearTimeout(timer);
+        if (!response.writableFinished) given++;
+      });
+      return true;
+    },
+  });
+  const page = await opened(`${server.address}cloud.html`);
+  await firstFrame(page);
+  await page.waitForTimeout(3000);
+  const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
+  const [x, y, z] = camera.focal_point;
+  for (let turn = 0; turn < 6; turn++) {
+    const near = { ...camera, position: [x + 1.3 * Math.cos(turn), y + 1.3 * Math.sin(turn), z + 0.2] };
+    await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), near);
+    await page.waitForTimeout(800);
+  }
+  await page.evaluate(() => heard.splice(0));
+  await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), { ...camera, position: [x + 1.2, y, z] });
+  const events = await rested(page);
+  ended(events);
+  const { cancelled, requests } = events.filter(({ name }) => name === "fetched").at(-1);
+  assert.ok(cancelled > 0 && given > 0, `${cancelled} of ${requests} requests were given up`);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+  server.close();
+  return `${cancelled} of ${requests} requests were given up`;
+};
+
+tests["a replaced file"] = async () => {
+  const { cloud } = makeLarge();
+  fs.rmSync(at("replaced"), { recursive: true, force: true });
+  fs.mkdirSync(at("replaced"));
+  const copy = at(`replaced/${cloud}`);
+  fs.copyFileSync(at(`large/${cloud}`), copy);
+  const server = await served([at("replaced"), at("large"), viewer], { ranges: true });
+  const page = await opened(`${server.address}cloud.html`);
+  ended(await rested(page));
+  await saved(page, "replaced-before.png");
+  const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
+  // The same length, other bytes, another time.
+  const bytes = fs.readFileSync(copy);
+  bytes.subarray(bytes.length / 2).fill(7);
+  fs.writeFileSync(copy, bytes);
+  await page.mouse.move(300, 220);
+  for (let step = 0; step < 5; step++) await page.mouse.wheel(0, -200);
+  await page.waitForFunction(() => heard.some(({ name }) => name === "error"), null, { timeout: PATIENCE });
+  const [problem] = (await page.evaluate(() => heard.splice(0))).filter(({ name }) => name === "error");
+  assert.match(problem.message, /cloud-\d+\.splk was replaced on the server/);
+  assert.equal(problem.isFatal, false);
+  await page.screenshot({ path: at("replaced.png") });
+  // What came before can still be seen.
+  await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), camera);
+  ended(await rested(page));
+  await saved(page, "replaced-after.png");
+  assert.equal(likeness("replaced-before.png", "replaced-after.png"), Infinity);
+  await page.context().close();
+  server.close();
+  return "said in words";
+};
+
+tests["a connection that is cut"] = async () => {
+  makeLarge();
+  let [isCut, cuts] = [true, 0];
+  const server = await largeServed({
+    answers(request, response, file) {
+      if (!isCut || !file || !request.headers.range || request.headers.range.startsWith("bytes=0-")) return false;
+      cuts++;
+      const [, start, last] = /bytes=(\d+)-(\d+)/.exec(request.headers.range);
+      const { size, mtimeMs } = fs.statSync(file);
+      response.writeHead(206, { etag: `"${size}-${mtimeMs}"`, "content-range": `bytes ${start}-${last}/${size}`, "content-length": last - start + 1 });
+      response.write(Buffer.alloc(1000));
+      setTimeout(() => request.socket.destroy(), 50);
+      return true;
+    },
+  });
+  const page = await opened(`${server.address}field.html`);
+  await page.waitForFunction(() => heard.some(({ name }) => name === "error"), null, { timeout: PATIENCE });
+  const events = await page.evaluate(() => heard.splice(0));
+  const problem = events.find(({ name }) => name === "error");
+  assert.match(problem.message, /connection was cut.*It is tried again/);
+  assert.equal(problem.isFatal, false);
+  await page.screenshot({ path: at("cut.png") });
+  isCut = false;
+  ended(await rested(page));
+  await saved(page, "cut-page.png");
+  if (!fs.existsSync(at("field-ranges.png"))) await tests["field in ranges"]();
+  assert.equal(likeness("cut-page.png", "field-ranges.png"), Infinity);
+  await page.context().close();
+  server.close();
+  return `${cuts} connections were cut`;
+};
+
+tests["a server without ranges"] = async () => {
+  makeLarge();
+  const answers = (request, response, file) => {
+    if (!file?.endsWith(".splk")) return false;
+    response.writeHead(200, { "content-length": 9e9 });
+    response.write(Buffer.alloc(1000));
+    return true;
+  };
+  const server = await largeServed({ answers });
+  const page = await opened(`${server.address}cloud.html`);
+  const problem = (await rested(page)).find(({ name }) => name === "error");
+  assert.match(problem.message, /sends the whole file of 9000\.0 MB when it is asked for a part/);
+  assert.equal(problem.isFatal, true);
+  await page.screenshot({ path: at("without-ranges.png") });
+  await page.context().close();
+  server.closeAllConnections();
+  server.close();
+  return "said in words";
+};
+
+tests["splatkit serve"] = async () => {
+  const { cloud } = makeLarge();
+  const process = spawn(splatkit, ["--quiet", "serve", `large/${cloud}`, ...look, "--no-open", "--viewer", viewer], { cwd: work });
+  try {
+    const line = await new Promise((done) => process.stdout.once("data", done));
+    const [address] = /http:\S+/.exec(line);
+    const page = await opened(address);
+    ended(await rested(page));
+    await saved(page, "serve-page.png");
+    if (!fs.existsSync(at("cloud-ranges.png"))) await tests["cloud in ranges"]();
+    assert.equal(likeness("serve-page.png", "cloud-ranges.png"), Infinity);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    const part = await fetch(`${address}${cloud}`, { headers: { range: "bytes=5-9" } });
+    const tag = part.headers.get("etag");
+    assert.deepEqual([part.status, (await part.arrayBuffer()).byteLength], [206, 5]);
+    const other = await fetch(`${address}${cloud}`, { headers: { range: "bytes=5-9", "if-match": '"x"' } });
+    assert.equal(other.status, 412);
+    const head = await fetch(`${address}${cloud}`, { method: "HEAD" });
+    assert.deepEqual([head.headers.get("etag"), Number(head.headers.get("content-length"))], [tag, fs.statSync(at(`large/${cloud}`)).size]);
+    const status = fs.existsSync(`/proc/${process.pid}/status`) && fs.readFileSync(`/proc/${process.pid}/status`, "utf8");
+    return status ? `${Math.round(/VmHWM:\s+(\d+)/.exec(status)[1] / 1024)} MiB at most` : "as in ranges";
+  } finally {
+    process.kill();
+  }
+};
+
+tests["a package"] = async () => {
+  const made = path.join(viewer, "../package");
+  const { name, version, exports, files } = JSON.parse(fs.readFileSync(path.join(made, "package.json"), "utf8"));
+  assert.match(version, /^\d+\.\d+\.\d+/);
+  for (const file of [...files, exports["."].types, exports["."].default]) assert.ok(fs.existsSync(path.join(made, file)), file);
+  const { cloud } = makeLarge();
+  const project = at("vite");
+  fs.mkdirSync(path.join(project, "public"), { recursive: true });
+  const packed = execFileSync("npm", ["pack", "--silent", "--pack-destination", project, made], { encoding: "utf8" }).trim().split("\n").at(-1);
+  fs.writeFileSync(path.join(project, "package.json"), JSON.stringify({ name: "look", private: true, type: "module", dependencies: { [name]: `file:./${packed}` } }));
+  fs.writeFileSync(path.join(project, "index.html"), `<!doctype html><html><head><link rel="icon" href="data:,"></head><body><script type="module" src="main.js"></script></body></html>`);
+  fs.writeFileSync(
+    path.join(project, "main.js"),
+    `import { SplatkitViewer } from "${name}";\nconst one = new SplatkitViewer();\none.style.cssText = "position:fixed;inset:0";\none.src = "./cloud.json";\ndocument.body.append(one);\n`,
+  );
+  for (const file of ["cloud.json", cloud]) fs.copyFileSync(at(`large/${file}`), path.join(project, "public", file));
+  fs.rmSync(path.join(project, "node_modules", name), { recursive: true, force: true });
+  execFileSync("npm", ["install", "--silent", "--no-package-lock", "vite@7", packed], { cwd: project });
+  execFileSync("npx", ["vite", "build", "--base", "./", "--logLevel", "warn"], { cwd: project });
+  const said = [];
+  for (const folders of [[path.join(project, "dist")], [at("large"), made]]) {
+    const server = await served(folders, { ranges: true, policy: POLICY });
+    const page = await opened(`${server.address}${said.length === 0 ? "" : "cloud.html"}`);
+    ended(await rested(page));
+    await saved(page, `package-${said.length}.png`);
+    assert.deepEqual(page.faults, []);
+    if (!fs.existsSync(at("cloud-ranges.png"))) await tests["cloud in ranges"]();
+    assert.equal(likeness(`package-${said.length}.png`, "cloud-ranges.png"), Infinity);
+    said.push(`${server.log.length} requests`);
+    await page.context().close();
+    server.close();
+  }
+  return `${name} ${version}: by Vite ${said[0]}, as it is ${said[1]}`;
 };
 
 makeInputs();

@@ -1,12 +1,14 @@
 //! The files of a page: those of the inputs as they are, or what they are converted to.
 
+use super::content::{Content, unread};
 use crate::{failure::Failure, job::Loaded, progress::Progress};
 use splatkit::{
     Device, Error,
     compare::compare_pictures,
     edit::Edit,
     formats::{self, Format, Kind},
-    input::{Limits, is_remote},
+    input::{Limits, Parts, is_remote},
+    picture::Picture,
     scene::Item,
     session::{
         AppearanceEntry, Data, Description, InputEntry, KernelEntry, LoadedInput, ReadInput,
@@ -16,6 +18,8 @@ use splatkit::{
 };
 use std::{
     collections::{BTreeMap, btree_map::Entry},
+    fs::{self, File},
+    io::{self, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
     slice,
 };
@@ -26,7 +30,7 @@ const READERS: [&str; 6] = ["ply", "obj", "gltf", "las", "e57", "vtk"];
 /// A scene file, and the files that it names.
 pub struct Published {
     pub scene: Description,
-    pub files: BTreeMap<String, Vec<u8>>,
+    pub files: BTreeMap<String, Content>,
 }
 
 /// Returns the scene of a page and its files. Inputs that the viewer reads stay as they are; the
@@ -98,18 +102,18 @@ fn add_file(
     entry: &mut InputEntry,
     read: &LoadedInput,
     folder: &str,
-    files: &mut BTreeMap<String, Vec<u8>>,
+    files: &mut BTreeMap<String, Content>,
 ) -> Result<(), Failure> {
     let name = format!("{folder}{}", name_of(&read.file));
     entry.file = name.clone().into();
     if let Entry::Vacant(place) = files.entry(name) {
-        place.insert(std::fs::read(&read.file).map_err(|source| unread(&read.file, &source))?);
+        place.insert(match read.kind {
+            // They may be larger than memory.
+            Kind::Hierarchy | Kind::Bricks => Content::Kept(read.file.clone()),
+            _ => Content::Held(fs::read(&read.file).map_err(|source| unread(&read.file, &source))?),
+        });
     }
     Ok(())
-}
-
-fn unread(file: &Path, source: &std::io::Error) -> Error {
-    Error::input(file, "file", format!("cannot be read: {source}"))
 }
 
 /// Adds the files that an input is converted to: one, or one for each channel. Returns their
@@ -118,7 +122,7 @@ fn converted_entries(
     (scene, loaded): (&Description, &Loaded),
     input: &InputEntry,
     (mut entry, folder): (InputEntry, &str),
-    files: &mut BTreeMap<String, Vec<u8>>,
+    files: &mut BTreeMap<String, Content>,
 ) -> Result<Vec<InputEntry>, Failure> {
     let ReadInput { data, .. } = scene.read_input(input)?;
     // The converted file has one array, is as the input was moved and edited, and knows its own
@@ -139,7 +143,7 @@ fn converted_entries(
                 entry.appearance = AppearanceEntry::default();
             }
             entry.file = format!("{folder}{name}").into();
-            files.insert(format!("{folder}{name}"), bytes);
+            files.insert(format!("{folder}{name}"), Content::Held(bytes));
             Ok(entry)
         };
     match data {
@@ -216,7 +220,7 @@ fn converted(
         Data::Cells(cells) => formats::write_cells(cells, &path),
         _ => hierarchy(scene, input, &path),
     };
-    let bytes = written.and_then(|()| std::fs::read(&path).map_err(|e| unread(&path, &e)));
+    let bytes = written.and_then(|()| fs::read(&path).map_err(|e| unread(&path, &e)));
     Ok((name, bytes?))
 }
 
@@ -262,17 +266,17 @@ impl Published {
         loaded: &mut Loaded,
         is_converted: bool,
     ) -> Result<(), Failure> {
-        let files = self.files.iter().map(|(name, bytes)| (PathBuf::from(name), bytes.clone()));
-        let mut again = self.scene.load_held(&files.collect(), &|_| {})?;
+        let sources = Sources::of(&self.files)?;
+        let mut again = sources.load(&self.scene)?;
         if !is_converted {
             return Ok(());
         }
         let is_label_map =
             |items: &[Item]| items.iter().map(Item::is_label_map).collect::<Vec<_>>();
         let has_labels = is_label_map(&loaded.scene.items) == is_label_map(&again.scene.items);
-        let mut is_alike = || -> Result<bool, Error> {
+        let mut is_alike = || -> Result<bool, Failure> {
             let (before, _) = loaded.draw(&small(scene), &Device::Cpu)?;
-            let (after, _) = again.draw(&small(&self.scene), &Device::Cpu)?;
+            let after = sources.draw(&mut again, &small(&self.scene))?;
             let likeness = compare_pictures(&before, &after)?.psnr;
             Ok(likeness.is_none_or(|likeness| likeness >= LEAST_ALIKE))
         };
@@ -284,6 +288,85 @@ impl Published {
                        it is converted";
         let hint = "write it in a format that pages read: docs/browser.md lists them";
         Err(Error::input(Path::new(&names.join(", ")), "inputs", message).hint(hint).into())
+    }
+}
+
+/// Most bytes of a file in parts in memory while it is read.
+const MOST_HELD: u64 = 1 << 28;
+
+/// The files of a page as the viewer reads them: whole, or in parts.
+struct Sources {
+    whole: BTreeMap<PathBuf, Vec<u8>>,
+    in_parts: BTreeMap<PathBuf, Parts>,
+    /// The files behind those in parts.
+    files: Vec<(PathBuf, File, Parts)>,
+}
+
+impl Sources {
+    fn of(contents: &BTreeMap<String, Content>) -> Result<Self, Failure> {
+        let mut sources =
+            Self { whole: BTreeMap::new(), in_parts: BTreeMap::new(), files: Vec::new() };
+        for (name, content) in contents {
+            match content {
+                Content::Held(bytes) => {
+                    sources.whole.insert(name.into(), bytes.clone());
+                }
+                Content::Kept(path) => {
+                    let file = File::open(path).map_err(|source| unread(path, &source))?;
+                    let parts = Parts::new(content.len()?, MOST_HELD);
+                    sources.in_parts.insert(name.into(), parts.clone());
+                    sources.files.push((path.clone(), file, parts));
+                }
+            }
+        }
+        Ok(sources)
+    }
+
+    /// Reads the scene.
+    fn load(&self, scene: &Description) -> Result<splatkit::session::Loaded, Failure> {
+        loop {
+            self.begin();
+            let loaded = scene.load_in_parts(&self.whole, &self.in_parts, &|_| {});
+            if !self.come()? {
+                return Ok(loaded?);
+            }
+        }
+    }
+
+    /// Draws the scene.
+    fn draw(
+        &self,
+        loaded: &mut splatkit::session::Loaded,
+        scene: &Description,
+    ) -> Result<Picture, Failure> {
+        loop {
+            self.begin();
+            let drawn = loaded.draw(scene, &Device::Cpu);
+            if !self.come()? {
+                return Ok(drawn?.0);
+            }
+        }
+    }
+
+    fn begin(&self) {
+        self.files.iter().for_each(|(.., parts)| parts.begin());
+    }
+
+    /// Hands in the parts that were missed. Returns whether there were any.
+    fn come(&self) -> Result<bool, Failure> {
+        let mut any = false;
+        for (path, file, parts) in &self.files {
+            for range in parts.requests() {
+                any = true;
+                let mut bytes = vec![0; (range.end - range.start) as usize];
+                let mut file = file;
+                file.seek(SeekFrom::Start(range.start))
+                    .and_then(|_| file.read_exact(&mut bytes))
+                    .map_err(|source: io::Error| unread(path, &source))?;
+                parts.arrive(range.start, &bytes)?;
+            }
+        }
+        Ok(any)
     }
 }
 

@@ -3,6 +3,9 @@
 //! The page has the scene file, the files of its inputs, and the viewer of tools/web, which draws
 //! by the CPU engine. So it shows what `splatkit render` draws of the same scene.
 
+#[cfg(feature = "serve")]
+mod answer;
+mod content;
 mod inputs;
 mod packing;
 mod page;
@@ -15,6 +18,7 @@ use crate::{
     timing::milliseconds,
 };
 use clap::Args;
+use content::Content;
 use inputs::Published;
 use page::Page;
 #[cfg(feature = "serve")]
@@ -215,11 +219,13 @@ impl Target {
         };
         progress.clear();
         if is_json {
-            let files = page.files.iter().map(|(name, bytes)| (name.clone(), bytes.len().into()));
+            let size = |content: &Content| Ok(content.len()?.into());
+            let files = page.files.iter().map(|(name, content)| Ok((name.clone(), size(content)?)));
+            let files = files.collect::<Result<serde_json::Map<_, _>, Failure>>()?;
             return output::json(&serde_json::json!({
                 "output": self.path().to_string_lossy(),
                 "bytes": bytes,
-                "files": files.collect::<serde_json::Map<_, _>>(),
+                "files": files,
             }));
         }
         let megabytes = bytes as f64 / 1e6;

@@ -1,9 +1,9 @@
 //! The page: one file with everything inside, or a folder.
 
-use super::{packing, viewer::Viewer};
+use super::{content::Content, packing, viewer::Viewer};
 use crate::failure::Failure;
 use splatkit::{Error, disk};
-use std::{borrow::Cow, collections::BTreeMap, fmt::Write as _, fs, path::Path};
+use std::{collections::BTreeMap, fmt::Write as _, fs, path::Path};
 
 /// What a page shows.
 pub struct Page {
@@ -11,7 +11,7 @@ pub struct Page {
     /// The scene file.
     pub scene: String,
     /// The files that it names.
-    pub files: BTreeMap<String, Vec<u8>>,
+    pub files: BTreeMap<String, Content>,
     /// What is behind the picture.
     pub background: Option<[f32; 3]>,
     pub version: &'static str,
@@ -25,10 +25,15 @@ const BOOT: &str = include_str!("../../web/js/page.js");
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; \
                       worker-src blob:; style-src 'unsafe-inline'; img-src blob: data:";
 
+/// What the page of a folder may do: run the scripts beside it, and read the files beside it.
+const FOLDER_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src \
+                             'self'; connect-src 'self'; style-src 'unsafe-inline'; img-src blob: \
+                             data:";
+
 impl Page {
     /// Writes one file with everything inside. Returns its bytes.
     pub fn write_file(&self, path: &Path, viewer: &Viewer) -> Result<u64, Failure> {
-        let mut text = self.head(Some(POLICY));
+        let mut text = self.head(POLICY);
         writeln!(text, "<splatkit-viewer label=\"{}\"></splatkit-viewer>", escaped(&self.title))
             .ok();
         text += NO_SCRIPT;
@@ -41,8 +46,9 @@ impl Page {
         .ok();
         packed(&mut text, "id=\"worker\"", &viewer.worker)?;
         packed(&mut text, "id=\"engine\"", &viewer.engine)?;
-        for (name, bytes) in &self.files {
-            packed(&mut text, &format!("data-file=\"{}\"", escaped(name)), bytes)?;
+        for (name, content) in &self.files {
+            let attribute = format!("data-file=\"{}\"", escaped(name));
+            packed(&mut text, &attribute, &content.bytes()?)?;
         }
         let element = String::from_utf8_lossy(&viewer.element);
         if [&*element, BOOT].iter().any(|script| script.contains("</script")) {
@@ -58,20 +64,19 @@ impl Page {
     /// Writes a folder for a static host. Returns the bytes of all files.
     pub fn write_folder(&self, folder: &Path, viewer: &Viewer) -> Result<u64, Failure> {
         let mut sum = 0;
-        for (name, bytes) in self.in_files(viewer) {
+        for (name, content) in self.in_files(viewer) {
             let path = folder.join(name);
             let above = path.parent().unwrap_or(folder);
             fs::create_dir_all(above).map_err(|error| Failure::output(above, error))?;
             disk::may_replace(&path, true);
-            disk::write(&path, &bytes)?;
-            sum += bytes.len() as u64;
+            sum += content.write(&path)?;
         }
         Ok(sum)
     }
 
     /// Returns the files of a folder, by their names.
-    pub fn in_files<'a>(&'a self, viewer: &'a Viewer) -> Vec<(String, Cow<'a, [u8]>)> {
-        let mut text = self.head(None);
+    pub fn in_files(&self, viewer: &Viewer) -> Vec<(String, Content)> {
+        let mut text = self.head(FOLDER_POLICY);
         writeln!(
             text,
             "<splatkit-viewer src=\"scene.json\" label=\"{}\"></splatkit-viewer>",
@@ -80,23 +85,21 @@ impl Page {
         .ok();
         text += NO_SCRIPT;
         text += "<script type=\"module\" src=\"splatkit-viewer.js\"></script>\n</body>\n</html>\n";
-        let scene = Cow::Borrowed(self.scene.as_bytes());
-        let mut all =
-            vec![("index.html".into(), text.into_bytes().into()), ("scene.json".into(), scene)];
-        let viewer = viewer.files().map(|(name, bytes)| (name.into(), bytes.into()));
-        let files = self.files.iter();
-        all.extend(
-            viewer.into_iter().chain(files.map(|(name, bytes)| (name.clone(), bytes.into()))),
-        );
+        let held = |bytes: &[u8]| Content::Held(bytes.to_vec());
+        let mut all = vec![
+            ("index.html".into(), held(text.as_bytes())),
+            ("scene.json".into(), held(self.scene.as_bytes())),
+        ];
+        all.extend(viewer.files().map(|(name, bytes)| (name.into(), held(bytes))));
+        all.extend(self.files.clone());
         all
     }
 
     /// Returns the beginning of a page.
-    fn head(&self, policy: Option<&str>) -> String {
+    fn head(&self, policy: &str) -> String {
         let title = escaped(&self.title);
-        let policy = policy.map_or(String::new(), |policy| {
-            format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\">\n")
-        });
+        let policy =
+            format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\">\n");
         let behind = self.background.map_or("Canvas".into(), |color| {
             let [red, green, blue] = color.map(|part| (255.0 * part).round());
             format!("rgb({red} {green} {blue})")

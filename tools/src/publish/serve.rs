@@ -1,10 +1,10 @@
 //! `splatkit serve`: shows a scene in a browser, from a server on this machine. The page is that of
-//! `splatkit publish`, and stays in memory.
+//! `splatkit publish`. Hierarchies and bricks are read from the disk, part by part, as the page asks
+//! for them; so is a folder that was published. The rest stays in memory.
 
-use super::{PageFlags, check_flags, viewer::Viewer};
+use super::{PageFlags, answer::Answer, check_flags, content::Content, viewer::Viewer};
 use crate::{failure::Failure, given::Given, output, progress::Progress, render::Render};
 use clap::Args;
-use http_body_util::Full;
 use hyper::{
     HeaderMap, Method, Request, Response, StatusCode,
     body::{Body, Bytes},
@@ -21,7 +21,7 @@ use std::{
     net::{IpAddr, Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     sync::Arc,
-    time::Duration,
+    time::{Duration, SystemTime, UNIX_EPOCH},
 };
 use tokio::net::TcpListener;
 
@@ -71,8 +71,50 @@ pub struct Serve {
     no_open: bool,
 }
 
-/// The files of a page, by their paths.
-type Files = BTreeMap<String, Bytes>;
+/// The files of a page.
+struct Files {
+    /// By their paths.
+    all: BTreeMap<String, Served>,
+    /// What tells the bytes in memory from those of another run.
+    tag: String,
+}
+
+/// A file that is served.
+enum Served {
+    Held(Bytes),
+    /// A file on this machine, which is opened for each request.
+    Kept(PathBuf),
+}
+
+impl Files {
+    fn new(all: impl IntoIterator<Item = (String, Content)>) -> Self {
+        let served = |content| match content {
+            Content::Held(bytes) => Served::Held(bytes.into()),
+            Content::Kept(path) => Served::Kept(path),
+        };
+        let all = all.into_iter().map(|(name, content)| (name, served(content))).collect();
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { all, tag: format!("{:x}", now.as_nanos()) }
+    }
+
+    /// Opens a file: its bytes, and what tells them from others (an entity tag). `None` if there is
+    /// no such file.
+    fn open(&self, path: &str) -> Option<(Answer, String)> {
+        match self.all.get(path)? {
+            Served::Held(bytes) => Some((Answer::held(bytes.clone()), format!("\"{}\"", self.tag))),
+            Served::Kept(path) => {
+                // Not what a link leads to, by now.
+                path.symlink_metadata().ok().filter(|meta| meta.is_file())?;
+                let file = fs::File::open(path).ok()?;
+                let meta = file.metadata().ok()?;
+                let written = meta.modified().unwrap_or(UNIX_EPOCH);
+                let written = written.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+                let tag = format!("\"{:x}-{written:x}\"", meta.len());
+                Some((Answer::of_file(file, meta.len()), tag))
+            }
+        }
+    }
+}
 
 impl Serve {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
@@ -90,8 +132,7 @@ impl Serve {
                 let viewer = Viewer::find(self.page.viewer.as_deref())?;
                 let page = self.page.page(&self.scene, &job, &viewer, progress);
                 let page = page.map_err(|failure| job.blamed(failure, &[]))?;
-                let files = page.in_files(&viewer).into_iter();
-                files.map(|(name, bytes)| (name, Bytes::from(bytes.into_owned()))).collect()
+                Files::new(page.in_files(&viewer))
             }
         };
         progress.clear();
@@ -120,7 +161,7 @@ fn published(folder: &Path) -> Result<Files, Failure> {
     let wrong = |path: &Path, error: io::Error| {
         Error::input(path, "page", format!("cannot be read: {error}"))
     };
-    let (mut files, mut open) = (Files::new(), vec![PathBuf::new()]);
+    let (mut files, mut open) = (Vec::new(), vec![PathBuf::new()]);
     while let Some(inner) = open.pop() {
         let path = folder.join(&inner);
         for entry in fs::read_dir(&path).map_err(|error| wrong(&path, error))? {
@@ -130,15 +171,14 @@ fn published(folder: &Path) -> Result<Files, Failure> {
             match entry.file_type().map_err(|error| wrong(&path, error))? {
                 kind if kind.is_dir() => open.push(inner),
                 kind if kind.is_file() => {
-                    let bytes = fs::read(&path).map_err(|error| wrong(&path, error))?;
                     let parts: Vec<_> = inner.iter().map(|part| part.to_string_lossy()).collect();
-                    files.insert(parts.join("/"), bytes.into());
+                    files.push((parts.join("/"), Content::Kept(path)));
                 }
                 _ => {}
             }
         }
     }
-    Ok(files)
+    Ok(Files::new(files))
 }
 
 /// Answers requests until the process ends. `ready` takes the address once it listens.
@@ -173,8 +213,9 @@ fn serve(files: Files, at: SocketAddr, ready: impl FnOnce(SocketAddr)) -> io::Re
 
 /// Returns the answer to a request. A server for this machine alone refuses requests that name
 /// another host: a foreign web page could send them through the user's browser.
-fn answered<B: Body>(files: &Files, request: &Request<B>, is_local: bool) -> Response<Full<Bytes>> {
-    if is_local && !is_of_this_machine(request.headers()) {
+fn answered<B: Body>(files: &Files, request: &Request<B>, is_local: bool) -> Response<Answer> {
+    let headers = request.headers();
+    if is_local && !is_of_this_machine(headers) {
         return said(StatusCode::FORBIDDEN, "this server answers this machine alone");
     }
     if ![Method::GET, Method::HEAD].contains(request.method()) {
@@ -183,20 +224,27 @@ fn answered<B: Body>(files: &Files, request: &Request<B>, is_local: bool) -> Res
     let path = percent_encoding::percent_decode_str(request.uri().path().trim_start_matches('/'));
     let path = path.decode_utf8_lossy();
     let path = if path.is_empty() { "index.html" } else { &*path };
-    let Some(bytes) = files.get(path) else {
+    let Some((answer, tag)) = files.open(path) else {
         return said(StatusCode::NOT_FOUND, "there is no such file");
     };
-    let range = request.headers().get(header::RANGE).and_then(|range| range.to_str().ok());
-    let mut response = part_of(bytes, range);
+    let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
+    if text(header::IF_MATCH).is_some_and(|tags| !names(tags, &tag)) {
+        return said(StatusCode::PRECONDITION_FAILED, "the file has changed");
+    }
+    // A part of another file than the one that the client has would be of no use.
+    let is_same = text(header::IF_RANGE).is_none_or(|known| known == tag);
+    let mut response = part_of(answer, text(header::RANGE).filter(|_| is_same));
     if *request.method() == Method::HEAD {
         let length = response.body().size_hint().lower();
-        *response.body_mut() = Full::default();
+        *response.body_mut() = Answer::default();
         response.headers_mut().insert(header::CONTENT_LENGTH, length.into());
     }
     let kind = mime_guess::from_path(path).first_or_octet_stream();
     let headers = response.headers_mut();
-    if let Ok(kind) = HeaderValue::from_str(kind.as_ref()) {
-        headers.insert(header::CONTENT_TYPE, kind);
+    for (name, value) in [(header::CONTENT_TYPE, kind.as_ref()), (header::ETAG, &*tag)] {
+        if let Ok(value) = HeaderValue::from_str(value) {
+            headers.insert(name, value);
+        }
     }
     headers.insert(header::ACCEPT_RANGES, HeaderValue::from_static("bytes"));
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -204,11 +252,15 @@ fn answered<B: Body>(files: &Files, request: &Request<B>, is_local: bool) -> Res
     response
 }
 
+/// Returns whether a list of entity tags has this one. A weak tag is no match.
+fn names(tags: &str, tag: &str) -> bool {
+    tags.split(',').map(str::trim).any(|named| named == "*" || named == tag)
+}
+
 /// Returns a file, or the one part of it that a request asks for.
-fn part_of(bytes: &Bytes, range: Option<&str>) -> Response<Full<Bytes>> {
-    let whole = || Response::new(Full::new(bytes.clone()));
-    let Some(range) = range else { return whole() };
-    let length = bytes.len() as u64;
+fn part_of(mut answer: Answer, range: Option<&str>) -> Response<Answer> {
+    let length = answer.size_hint().lower();
+    let Some(range) = range else { return Response::new(answer) };
     let Ok(parts) = http_range_header::parse_range_header(range)
         .map_err(drop)
         .and_then(|parsed| parsed.validate(length).map_err(drop))
@@ -220,9 +272,12 @@ fn part_of(bytes: &Bytes, range: Option<&str>) -> Response<Full<Bytes>> {
         return response;
     };
     // Several parts at once may be answered by the whole.
-    let [part] = &parts[..] else { return whole() };
+    let [part] = &parts[..] else { return Response::new(answer) };
     let (start, end) = (*part.start(), *part.end());
-    let mut response = Response::new(Full::new(bytes.slice(start as usize..=end as usize)));
+    if answer.cut(start..end + 1).is_err() {
+        return said(StatusCode::INTERNAL_SERVER_ERROR, "the file cannot be read");
+    }
+    let mut response = Response::new(answer);
     *response.status_mut() = StatusCode::PARTIAL_CONTENT;
     if let Ok(value) = HeaderValue::from_str(&format!("bytes {start}-{end}/{length}")) {
         response.headers_mut().insert(header::CONTENT_RANGE, value);
@@ -241,8 +296,8 @@ fn is_of_this_machine(headers: &HeaderMap) -> bool {
     name == "localhost" || name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
-fn said(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
-    let mut response = Response::new(Full::new(Bytes::from_static(text.as_bytes())));
+fn said(status: StatusCode, text: &'static str) -> Response<Answer> {
+    let mut response = Response::new(Answer::held(Bytes::from_static(text.as_bytes())));
     *response.status_mut() = status;
     response
 }
@@ -251,29 +306,34 @@ fn said(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
 mod tests {
     use super::*;
 
-    fn asked(files: &Files, path: &str, headers: &[(&str, &str)]) -> Response<Full<Bytes>> {
+    fn asked(files: &Files, path: &str, headers: &[(&str, &str)]) -> Response<Answer> {
         let mut request = Request::builder().uri(path).header("host", "localhost:1");
         for (name, value) in headers {
             request = request.header(*name, *value);
         }
-        answered(files, &request.body(Full::<Bytes>::default()).expect("a request"), true)
+        answered(files, &request.body(Answer::default()).expect("a request"), true)
     }
 
-    fn length(response: &Response<Full<Bytes>>) -> u64 {
+    fn length(response: &Response<Answer>) -> u64 {
         response.body().size_hint().lower()
     }
 
     #[test]
     fn files_and_their_parts_are_answered() {
-        let files = Files::from([
-            ("index.html".into(), Bytes::from_static(b"<p>")),
-            ("a b.splk".into(), Bytes::from(vec![7; 1000])),
+        let folder = tempfile::tempdir().expect("a folder");
+        let kept = folder.path().join("a b.splk");
+        let bytes: Vec<u8> = (0..1000).map(|at| (at % 251) as u8).collect();
+        fs::write(&kept, &bytes).expect("a file");
+        let files = Files::new([
+            ("index.html".into(), Content::Held(b"<p>".to_vec())),
+            ("a b.splk".into(), Content::Kept(kept.clone())),
         ]);
         let response = asked(&files, "/", &[]);
         assert_eq!((response.status(), length(&response)), (StatusCode::OK, 3));
         assert_eq!(response.headers()["content-type"], "text/html");
         let whole = asked(&files, "/a%20b.splk", &[]);
         assert_eq!(length(&whole), 1000);
+        assert_eq!(whole.into_body().taken(), bytes);
         for (range, status, count) in [
             ("bytes=0-9", 206, 10),
             ("bytes=990-", 206, 10),
@@ -287,12 +347,31 @@ mod tests {
         }
         let part = asked(&files, "/a%20b.splk", &[("range", "bytes=-20")]);
         assert_eq!(part.headers()["content-range"], "bytes 980-999/1000");
+        let tag = part.headers()["etag"].to_str().expect("a tag").to_owned();
+        assert_eq!(part.into_body().taken(), bytes[980..]);
+        let range = ("range", "bytes=5-9");
+        for (name, value, status) in [
+            ("if-match", &*tag, 206),
+            ("if-match", "\"x\"", 412),
+            ("if-range", &*tag, 206),
+            ("if-range", "\"x\"", 200),
+        ] {
+            let response = asked(&files, "/a%20b.splk", &[range, (name, value)]);
+            assert_eq!(response.status(), status, "{name}: {value}");
+        }
+        // Another file in its place, which is shorter.
+        fs::write(&kept, [1; 10]).expect("a file");
+        let changed = asked(&files, "/a%20b.splk", &[("if-match", &tag)]);
+        assert_eq!(changed.status(), 412);
+        assert_eq!(asked(&files, "/a%20b.splk", &[range]).into_body().taken(), [1; 5]);
+        fs::remove_file(&kept).expect("no file");
+        assert_eq!(asked(&files, "/a%20b.splk", &[]).status(), StatusCode::NOT_FOUND);
         assert_eq!(asked(&files, "/../secret", &[]).status(), StatusCode::NOT_FOUND);
     }
 
     #[test]
     fn others_are_refused() {
-        let files = Files::from([("index.html".into(), Bytes::new())]);
+        let files = Files::new([("index.html".into(), Content::Held(Vec::new()))]);
         for (host, is_allowed) in [
             ("localhost:8000", true),
             ("127.0.0.1:8000", true),
@@ -302,7 +381,7 @@ mod tests {
             ("", false),
         ] {
             let request = Request::builder().uri("/").header("host", host);
-            let request = request.body(Full::<Bytes>::default()).expect("a request");
+            let request = request.body(Answer::default()).expect("a request");
             let allowed = answered(&files, &request, true).status() == StatusCode::OK;
             assert_eq!(allowed, is_allowed, "{host}");
             assert_eq!(answered(&files, &request, false).status(), StatusCode::OK, "{host}");
