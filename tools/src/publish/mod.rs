@@ -18,7 +18,6 @@ use crate::{
     timing::milliseconds,
 };
 use clap::Args;
-use content::Content;
 use inputs::Published;
 use page::Page;
 #[cfg(feature = "serve")]
@@ -219,9 +218,10 @@ impl Target {
         };
         progress.clear();
         if is_json {
-            let size = |content: &Content| Ok(content.len()?.into());
-            let files = page.files.iter().map(|(name, content)| Ok((name.clone(), size(content)?)));
-            let files = files.collect::<Result<serde_json::Map<_, _>, Failure>>()?;
+            let mut files = serde_json::Map::new();
+            for (name, content) in &page.files {
+                files.insert(name.clone(), content.len()?.into());
+            }
             return output::json(&serde_json::json!({
                 "output": self.path().to_string_lossy(),
                 "bytes": bytes,
