@@ -65,7 +65,7 @@ impl Answer {
     #[cfg(test)]
     pub fn taken(mut self) -> Vec<u8> {
         let portions = std::iter::from_fn(|| self.next());
-        portions.map(|portion| portion.expect("a portion")).flatten().collect()
+        portions.flat_map(|portion| portion.expect("a portion")).collect()
     }
 }
 
