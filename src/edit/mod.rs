@@ -11,7 +11,7 @@
 //! | `region` | the shapes of `crop` |
 //! | `motion` | moves, turns, scales and matrices |
 //! | `reproject` | other coordinate reference systems |
-//! | `thin`, `coarser`, `merge` | fewer points, coarser meshes, and fewer splats that look the same |
+//! | `thin`, `coarser`, `merge` | fewer points, vertices, and splats that look the same |
 //! | `clusters` | floaters, and the largest parts |
 //! | `surface`, `records`, `gaussians`, `splats` | the scenes that are edited |
 //! | `stream` | points larger than memory |

@@ -488,7 +488,8 @@ mod tests {
         }
         let kept = chosen(&places, &Thin::Share(0.1).kept(&places).unwrap());
         assert_eq!(kept.len(), 2000);
-        // They are evenly spread, also where a slab ends: a random choice has points at a hundredth of this distance.
+        // They are evenly spread, also where a slab ends: a random choice has points at a hundredth
+        // of this distance.
         let nearest = |at: usize| {
             let others = kept.iter().enumerate().filter(|(other, _)| *other != at);
             others.map(|(_, other)| other.distance(kept[at])).fold(f32::INFINITY, f32::min)

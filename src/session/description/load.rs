@@ -158,8 +158,8 @@ impl Description {
         self.load_in_parts(files, &BTreeMap::new(), does)
     }
 
-    /// As [`load_held`](Self::load_held), with hierarchies (`.splk`) and volumes in bricks (`.splv`)
-    /// that come in parts. The scene may be rough as long as one of them
+    /// As [`load_held`](Self::load_held), with hierarchies (`.splk`) and volumes in bricks
+    /// (`.splv`) that come in parts. The scene may be rough as long as one of them
     /// [`lacks`](Parts::lacks) parts: coarse levels then decide the transfer function and what is
     /// seen. Load it again once they have come.
     ///
