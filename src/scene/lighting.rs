@@ -105,9 +105,11 @@ impl Lighting {
 
     /// As photographers light: a key light, some light from all sides, and some from the eye.
     pub fn studio(up: DVec3) -> Self {
-        let sky = Some(Sky { up, share: 0.35 });
+        // Together they are little more than the light from the eye alone, so that bright
+        // surfaces keep their shapes.
+        let sky = Some(Sky { up, share: 0.3 });
         let occlusion = Some(Occlusion::default());
-        Self { head: 0.15, key: Some(KeyLight::upper_left(0.6)), sky, occlusion }
+        Self { head: 0.1, key: Some(KeyLight::upper_left(0.5)), sky, occlusion }
     }
 
     /// Light from all sides, brighter from above.

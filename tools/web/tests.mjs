@@ -359,7 +359,8 @@ tests["a view that moves on"] = async () => {
   const events = await rested(page);
   ended(events);
   const { cancelled, requests } = events.filter(({ name }) => name === "fetched").at(-1);
-  assert.ok(cancelled > 0 && given > 0, `${cancelled} of ${requests} requests were given up`);
+  // Those that waited in the browser never reached the server.
+  assert.ok(cancelled > 0 && given <= cancelled, `${cancelled} of ${requests} requests were given up, ${given} on the way`);
   assert.deepEqual(page.faults, []);
   await page.context().close();
   server.close();

@@ -65,15 +65,7 @@ class Ranges {
   async #first(file) {
     const response = await this.#asked(file, 0, FIRST);
     if (response.status === 200) {
-      const bytes = Number(response.headers.get("content-length")) || Infinity;
-      if (bytes > SMALL) {
-        response.body?.cancel();
-        const size = bytes === Infinity ? "" : ` of ${inMegabytes(bytes)}`;
-        throw new Refusal(
-          `${file.url}: the server sends the whole file${size} when it is asked for a part. Put it on a host that answers range requests, as most static hosts and \`splatkit serve\` do.`,
-        );
-      }
-      const whole = await response.arrayBuffer();
+      const whole = await this.#whole(file, response);
       this.sums.bytes += whole.byteLength;
       return { whole };
     }
@@ -93,6 +85,26 @@ class Ranges {
     if (isNear && tag && !tag.startsWith("W/")) file.tag = tag;
     const bytes = await this.#bytesOf(file, response, Number(range[1]) + 1);
     return { number: this.#files.push(file) - 1, size: file.size, bytes };
+  }
+
+  /** Takes all of a small file from a server without ranges. Answers need not say how long they
+   *  are. */
+  async #whole(file, response) {
+    const [parts, reader] = [[], response.body.getReader()];
+    let size = Number(response.headers.get("content-length")) || 0;
+    for (let held = 0; size <= SMALL; ) {
+      const { done, value } = await reader.read().catch(() => {
+        throw new Error(`${file.url}: the connection was cut`);
+      });
+      if (done) return new Blob(parts).arrayBuffer();
+      parts.push(value);
+      held += value.length;
+      size = Math.max(size, held);
+    }
+    reader.cancel().catch(() => {});
+    throw new Refusal(
+      `${file.url}: the server sends the whole file, more than ${inMegabytes(SMALL)}, when it is asked for a part. Put it on a host that answers range requests, as most static hosts and \`splatkit serve\` do.`,
+    );
   }
 
   /** Asks for a range. */

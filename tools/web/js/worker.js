@@ -168,6 +168,7 @@ async function open({ scene, files, width, height }) {
     warnings: viewer.warnings(),
     transfers: viewer.transfers(),
   });
+  if (ranges) sayFetched();
   schedule();
 }
 
