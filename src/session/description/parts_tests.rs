@@ -194,7 +194,8 @@ fn comes_to_the_whole((name, bytes): (&str, &[u8]), more: &str, most: u64) -> Re
     let shown = shown(&scene, &mut server).map_err(|error| error.to_string())?;
     let Shown { first, all, rough, most: held, .. } = shown;
     let told = format!("{first} of {all} of {} bytes, {rough} rough, {held} held", bytes.len());
-    let is_fine = rough >= 2 && first < all && first <= 1 << 20 && held <= most;
+    // The transfer function of a volume this small is made from all of its samples at once.
+    let is_fine = rough >= 1 && first < all && first <= 1 << 20 && held <= most;
     match is_fine && is_same(&shown.last, &whole(&scene, bytes)) {
         true => Ok(()),
         false => Err(told),
