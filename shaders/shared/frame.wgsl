@@ -36,11 +36,12 @@ struct Frame {
     world_z: vec4<f32>,
     // Lights that are not from the eye. The shares of the light from the eye, from the key lamp and
     // from the sky. How far before a surface light from all sides and that of the lamp are taken.
-    // The direction to the lamp. From view space to the nodes and maps of lamps.wgsl: factors on a
-    // place's coordinates, and a constant.
+    // The direction to the lamp. The mean direction of the sky's light in the open. From view space
+    // to the nodes and maps of lamps.wgsl: factors on a place's coordinates, and a constant.
     lamp_shares: vec4<f32>,
     lamp_steps: vec4<f32>,
     key_direction: vec4<f32>,
+    sky_side: vec4<f32>,
     open_x: vec4<f32>,
     open_y: vec4<f32>,
     open_z: vec4<f32>,

@@ -23,8 +23,6 @@ struct Reaching {
 
 // From the smallest length on, a surface's normal is certain.
 const CERTAIN: vec2<f32> = vec2(0.0, 1e30);
-// The most light from all sides, in that of the open.
-const MOST_OPEN: f32 = 2.0;
 
 // Returns how far a normal counts: from the magnitude certain.x on, up to 1. certain.y is one over
 // the magnitudes over which it comes to count in full.
@@ -64,7 +62,9 @@ fn light_of(
         return vec2(shade.x + shade.y * shown, gloss);
     }
     let way = select(normal, -normal, dot(normal, direction) > 0.0) / max(size, 1e-20);
-    let open = clamp(reaching.open + 2.0 * share * dot(reaching.side, way), 0.0, MOST_OPEN);
+    // In the open there is no more.
+    let most = 1.0 + 2.0 * share * dot(frame.sky_side.xyz, way);
+    let open = max(min(reaching.open + 2.0 * share * dot(reaching.side, way), most), 0.0);
     let head = frame.lamp_shares.x;
     let key = frame.lamp_shares.y * reaching.key;
     let towards = frame.key_direction.xyz;

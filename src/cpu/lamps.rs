@@ -15,8 +15,6 @@ use fearless_simd::{Simd, f32x4, prelude::*};
 
 /// A shorter gradient has no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
-/// The most light from all sides, in that of the open.
-const MOST_OPEN: f32 = 2.0;
 
 /// The light that reaches eight places.
 #[derive(Clone, Copy)]
@@ -193,7 +191,9 @@ impl<S: Simd> Turned<S> {
         };
         let [x, y, z, amount] = reaching.open;
         let open = amount + certain * dot([x, y, z], self.normal) * 2.0;
-        let open = open.max(none).min(Lanes::splat(simd, MOST_OPEN));
+        // In the open there is no more.
+        let most = certain.mul_add(dot_with(lamps.sky_side, self.normal) * 2.0, one);
+        let open = open.min(most).max(none);
         let mut factor = open * ((shown(self.facing) * lamps.head + lamps.sky) * diffuse + ambient);
         let mut highlight = highlight * open * lamps.head;
         if lamps.key > 0.0 {

@@ -98,6 +98,8 @@ impl Frame {
         self.lamp_shares = [lamps.head, lamps.key, lamps.sky, 0.0];
         self.lamp_steps = [lamps.open_step, lamps.key_step, 0.0, 0.0];
         self.key_direction = [x, y, z, 0.0];
+        let [x, y, z] = lamps.sky_side;
+        self.sky_side = [x, y, z, 0.0];
         [self.open_x, self.open_y, self.open_z] = lamps.to_open;
         [self.key_x, self.key_y, self.key_z] = lamps.to_key;
     }

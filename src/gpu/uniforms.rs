@@ -45,6 +45,7 @@ pub struct Frame {
     pub lamp_shares: [f32; 4],
     pub lamp_steps: [f32; 4],
     pub key_direction: [f32; 4],
+    pub sky_side: [f32; 4],
     pub open_x: [f32; 4],
     pub open_y: [f32; 4],
     pub open_z: [f32; 4],

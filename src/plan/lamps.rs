@@ -55,6 +55,8 @@ pub struct Lamps {
     pub sky: f32,
     /// The direction towards the key lamp.
     pub key_direction: [f32; 3],
+    /// The mean direction of the sky's light in the open. 0 without a sky.
+    pub sky_side: [f32; 3],
     pub shadows: Shadows,
     /// How far before a surface its light is taken.
     pub open_step: f32,
@@ -222,6 +224,9 @@ impl Lamps {
             key: key.map_or(0.0, |key| key.share) as f32,
             sky: sky.map_or(0.0, |sky| sky.share) as f32,
             key_direction: key_direction.as_vec3().to_array(),
+            sky_side: (view.rotation * Openness::open(sky).truncate().as_dvec3())
+                .as_vec3()
+                .to_array(),
             shadows: shadows.clone(),
             open_step: step(open.as_ref().map(|open| open.place.step)),
             key_step: step(map.as_ref().map(|map| map.view.step)),

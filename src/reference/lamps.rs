@@ -107,10 +107,12 @@ impl Lamps {
             let place = ray.point(distance) + Lighting::AHEAD * step * out;
             self.view.position + to_world * place
         };
-        let mut reaching = Reaching { side: DVec3::ZERO, open: 1.0, key: 1.0 };
+        let none = DVec3::ZERO;
+        let mut reaching = Reaching { side: none, clear_side: none, open: 1.0, key: 1.0 };
         if let Some(open) = &self.open {
             let light = open.at(world(open.place.step));
             reaching.side = self.view.rotation * light.truncate();
+            reaching.clear_side = self.view.rotation * open.open.truncate();
             reaching.open = light.w;
         }
         if let Some(map) = &self.key {

@@ -8,15 +8,14 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reaching {
     pub side: DVec3,
+    /// The same direction in the open.
+    pub clear_side: DVec3,
     pub open: f64,
     pub key: f64,
 }
 
 /// The lights of a picture, and what of them reaches a place.
 pub(super) type Lit = Option<(Lighting, Reaching)>;
-
-/// The largest amount of light from all sides, in that of the open.
-const MOST_OPEN: f64 = 2.0;
 
 /// Returns a lit colour by Blinn and Phong's reflection (Blinn 1977) with a light at the eye, on
 /// both sides of a surface. `normal` may have any length. If it has none, the ambient and diffuse
@@ -69,7 +68,9 @@ pub(super) fn light(
     let Some((lighting, reaching)) = lit else {
         return [ambient + diffuse * shown(facing), gloss(facing)];
     };
-    let open = (reaching.open + 2.0 * certain * reaching.side.dot(normal)).clamp(0.0, MOST_OPEN);
+    let all_sides = |amount: f64, side: DVec3| amount + 2.0 * certain * side.dot(normal);
+    let open = all_sides(reaching.open, reaching.side);
+    let open = open.min(all_sides(1.0, reaching.clear_side)).max(0.0);
     let sky = lighting.sky.map_or(0.0, |sky| sky.share);
     let mut factor = open * (ambient + diffuse * (lighting.head * shown(facing) + sky));
     let mut highlight = open * lighting.head * gloss(facing);
