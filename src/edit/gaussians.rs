@@ -1,6 +1,6 @@
 //! Trained Gaussians.
 
-use super::{Editable, Motion, find, merge, retain, thin::Thin};
+use super::{Editable, Motion, find, reduce, retain, thin::Thin};
 use crate::{
     Result,
     gaussians::{
@@ -83,8 +83,7 @@ impl Editable for Gaussians {
     }
 
     fn thin(&mut self, thin: &Thin) -> Result<()> {
-        *self = merge::gaussians(self, thin)?;
-        Ok(())
+        reduce::thin(self, thin)
     }
 }
 

@@ -7,7 +7,6 @@
 use super::thin::Thin;
 use crate::{
     Result,
-    gaussians::{Gaussians, harmonics::terms},
     hierarchy::{BuildOptions, Node, Tree},
     splat::Surfels,
 };
@@ -87,32 +86,4 @@ pub fn splats(set: &Surfels, thin: &Thin) -> Result<Surfels> {
     let splat = |&(block, node): &(usize, usize)| tree.blocks[block].nodes[node].splat;
     let splats = chosen.iter().map(splat).collect();
     Ok(Surfels { origin: tree.origin, splats, extent: tree.extent })
-}
-
-/// Returns the Gaussians of a scene merged. Those that cover less than 1/255 of any pixel are left
-/// out.
-pub fn gaussians(set: &Gaussians, thin: &Thin) -> Result<Gaussians> {
-    let tree = Tree::of_gaussians(set, &BuildOptions::default(), None)?;
-    let chosen = chosen(&tree, thin);
-    let splat = |&(block, node): &(usize, usize)| {
-        let splat = tree.blocks[block].nodes[node].splat;
-        // The optical depth is all that the node covers.
-        crate::splat::Splat { color: u32::MAX, ..splat }
-    };
-    let splats = chosen.iter().map(splat).collect();
-    let merged =
-        Gaussians::from_splats(&Surfels { origin: tree.origin, splats, extent: tree.extent })?;
-    let count = terms(set.degree);
-    let colors = chosen.iter().flat_map(|&(block, node)| {
-        let colors = tree.blocks[block].colors.as_ref();
-        let harmonics = colors.map(|colors| colors.harmonics(node)).unwrap_or_default();
-        harmonics.into_iter().take(count)
-    });
-    Ok(Gaussians {
-        degree: set.degree,
-        harmonics: colors.collect(),
-        broken: set.broken,
-        about: set.about.clone(),
-        ..merged
-    })
 }

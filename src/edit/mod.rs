@@ -11,7 +11,7 @@
 //! | `region` | the shapes of `crop` |
 //! | `motion` | moves, turns, scales and matrices |
 //! | `reproject` | other coordinate reference systems |
-//! | `thin`, `coarser`, `merge` | fewer points, vertices, and splats that look the same |
+//! | `thin`, `coarser`, `merge`, `reduce` | fewer points, vertices, splats and Gaussians that look the same |
 //! | `clusters` | floaters, and the largest parts |
 //! | `surface`, `records`, `gaussians`, `splats` | the scenes that are edited |
 //! | `stream` | points larger than memory |
@@ -38,6 +38,7 @@ mod gaussians;
 mod merge;
 mod motion;
 mod records;
+mod reduce;
 mod region;
 mod reproject;
 mod splats;
@@ -50,6 +51,7 @@ mod thin;
 
 pub use expression::Expression;
 pub use motion::Motion;
+pub use reduce::levels;
 pub use region::{Region, Sight};
 pub use reproject::{Crs, Mapping, Reprojection};
 pub use statistics::{BINS, Statistics, statistics};

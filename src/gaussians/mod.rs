@@ -143,6 +143,26 @@ impl Gaussians {
         }
     }
 
+    /// Returns these Gaussians, in this order.
+    ///
+    /// # Panics
+    /// If there is no such Gaussian.
+    pub fn chosen(&self, indices: &[u32]) -> Self {
+        let all = |list: &[Vec3]| indices.iter().map(|&i| list[i as usize]).collect();
+        let harmonics = indices.iter().flat_map(|&i| self.harmonics_of(i as usize));
+        Self {
+            origin: self.origin,
+            centers: all(&self.centers),
+            scales: all(&self.scales),
+            rotations: indices.iter().map(|&i| self.rotations[i as usize]).collect(),
+            opacities: indices.iter().map(|&i| self.opacities[i as usize]).collect(),
+            degree: self.degree,
+            harmonics: harmonics.copied().collect(),
+            broken: self.broken,
+            about: self.about.clone(),
+        }
+    }
+
     /// Gives the colours this degree. Added terms are 0; those above it are dropped.
     pub fn set_degree(&mut self, degree: u32) {
         let (old, new) = (harmonics::terms(self.degree), harmonics::terms(degree));

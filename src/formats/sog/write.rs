@@ -5,6 +5,7 @@
 
 mod codebook;
 mod palette;
+pub(super) mod streamed;
 mod webp;
 
 use super::{ENTRIES_IN_ROW, FIRST_TAG, META};
@@ -59,7 +60,8 @@ pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     }
     let size = Size::of(set.len())?;
     memory::room("packing Gaussians", (MEMORY * set.len()) as u64)?;
-    let (meta, planes) = pack(set, size);
+    let order: Vec<usize> = curve::order(set).into_iter().map(|(_, index)| index).collect();
+    let (meta, planes) = pack(set, size, &order);
     if path.file_name().is_some_and(|name| name == META) {
         return write_beside(path, &meta, &planes);
     }
@@ -121,24 +123,23 @@ impl Size {
     }
 
     /// Encodes a plane with the pixel of each Gaussian in its order.
-    fn plane(self, order: &[(u64, usize)], pixel: impl Fn(usize) -> [u8; 4] + Sync) -> Vec<u8> {
-        let mut pixels: Vec<[u8; 4]> = order.par_iter().map(|&(_, index)| pixel(index)).collect();
+    fn plane(self, order: &[usize], pixel: impl Fn(usize) -> [u8; 4] + Sync) -> Vec<u8> {
+        let mut pixels: Vec<[u8; 4]> = order.par_iter().map(|&index| pixel(index)).collect();
         pixels.resize(self.width * self.height, NONE);
         webp::encode(&pixels, self.width)
     }
 }
 
-/// Returns the `meta.json` and the planes of Gaussians.
-fn pack(set: &Gaussians, size: Size) -> (Vec<u8>, Vec<Named>) {
-    let order = curve::order(set);
+/// Returns the `meta.json` and the planes of Gaussians, in this order.
+fn pack(set: &Gaussians, size: Size, order: &[usize]) -> (Vec<u8>, Vec<Named>) {
     let places = Places::of(set);
     let means = |index: usize, byte: usize| {
         opaque(places.steps(set, index).map(|steps| steps.to_le_bytes()[byte]))
     };
     let mut planes = vec![
-        ("means_l.webp", size.plane(&order, |index| means(index, 0))),
-        ("means_u.webp", size.plane(&order, |index| means(index, 1))),
-        ("quats.webp", size.plane(&order, |index| rotation(set.rotations[index]))),
+        ("means_l.webp", size.plane(order, |index| means(index, 0))),
+        ("means_u.webp", size.plane(order, |index| means(index, 1))),
+        ("quats.webp", size.plane(order, |index| rotation(set.rotations[index]))),
     ];
     let log = |scale: f32| scale.ln().clamp(LOGS[0], LOGS[1]);
     let weights = Weights::of(set);
@@ -147,14 +148,14 @@ fn pack(set: &Gaussians, size: Size) -> (Vec<u8>, Vec<Named>) {
     });
     let deviations =
         |index: usize| opaque(set.scales[index].to_array().map(|scale| scales.nearest(log(scale))));
-    planes.push(("scales.webp", size.plane(&order, deviations)));
+    planes.push(("scales.webp", size.plane(order, deviations)));
     let constants =
         Codebook::of_sample(3 * set.len(), |at| (set.harmonics_of(at / 3)[0][at % 3], 1.0));
     let color = |index: usize| {
         let [r, g, b] = set.harmonics_of(index)[0].map(|term| constants.nearest(term));
         [r, g, b, (set.opacities[index] * 255.0).round() as u8]
     };
-    planes.push(("sh0.webp", size.plane(&order, color)));
+    planes.push(("sh0.webp", size.plane(order, color)));
     let mut meta = json!({
         "version": 2,
         "asset": { "generator": concat!("splatkit ", env!("CARGO_PKG_VERSION")) },
@@ -169,7 +170,7 @@ fn pack(set: &Gaussians, size: Size) -> (Vec<u8>, Vec<Named>) {
         "sh0": { "codebook": constants.levels(), "files": ["sh0.webp"] }
     });
     if set.degree > 0 {
-        meta["shN"] = pack_harmonics(set, size, &order, &mut planes);
+        meta["shN"] = pack_harmonics(set, size, order, &mut planes);
     }
     (meta.to_string().into_bytes(), planes)
 }
@@ -202,12 +203,7 @@ impl Weights {
 }
 
 /// Adds the planes of the terms above the constant one, and returns what `meta.json` says of them.
-fn pack_harmonics(
-    set: &Gaussians,
-    size: Size,
-    order: &[(u64, usize)],
-    planes: &mut Vec<Named>,
-) -> Value {
+fn pack_harmonics(set: &Gaussians, size: Size, order: &[usize], planes: &mut Vec<Named>) -> Value {
     let Palette { entries, labels, uses } = Palette::of(set);
     let terms = terms(set.degree) - 1;
     let values = entries.chunks_exact(3 * terms).zip(&uses);

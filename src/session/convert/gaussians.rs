@@ -8,6 +8,7 @@ use super::{
 use crate::{
     Error, Result,
     about::Orientation,
+    edit,
     formats::{self, Kind},
     gaussians::{Gaussians, harmonics},
     hierarchy::{self, BuildOptions, Hierarchy, file::WriteOptions},
@@ -29,21 +30,23 @@ struct AllGaussians {
 
 impl Target {
     /// Writes Gaussians.
-    fn write(self, set: &Gaussians, path: &Path, spz_version: u32) -> Result<()> {
+    fn write(self, set: Gaussians, path: &Path, spz_version: u32) -> Result<()> {
         match self {
             #[cfg(feature = "ply")]
-            Self::Ply => formats::ply::write_gaussians(set, path),
+            Self::Ply => formats::ply::write_gaussians(&set, path),
             #[cfg(feature = "ply")]
-            Self::CompressedPly => formats::ply::write_compressed_gaussians(set, path),
+            Self::CompressedPly => formats::ply::write_compressed_gaussians(&set, path),
             #[cfg(feature = "gltf")]
-            Self::Glb => formats::gltf::write_gaussians(set, path),
-            Self::Splat => formats::splat::write(set, path),
-            Self::Spz if spz_version == 3 => formats::spz::write(set, path),
+            Self::Glb => formats::gltf::write_gaussians(&set, path),
+            Self::Splat => formats::splat::write(&set, path),
+            Self::Spz if spz_version == 3 => formats::spz::write(&set, path),
             #[cfg(feature = "files")]
-            Self::Spz if spz_version == 4 => formats::spz::write_streams(set, path),
+            Self::Spz if spz_version == 4 => formats::spz::write_streams(&set, path),
             Self::Spz => Err(wrong(format!("this build writes no version {spz_version} of SPZ"))),
             #[cfg(feature = "sog")]
-            Self::Sog => formats::sog::write(set, path),
+            Self::Sog => formats::sog::write(&set, path),
+            #[cfg(feature = "sog")]
+            Self::StreamedSog => formats::sog::write_streamed(&edit::levels(set)?, path),
             _ => Err(wrong(format!("{}: this build writes no such file", path.display()))),
         }
     }
@@ -58,12 +61,18 @@ impl Target {
             Self::Splat => 32,
             Self::Spz => 20 + more,
             Self::Sog => 20 + more,
+            // All levels together have a third more Gaussians than the finest.
+            Self::StreamedSog => 27 + more * 4 / 3,
             Self::Glb => 4 * (18 + more),
             Self::Ply | Self::Hierarchy | Self::Points | Self::Nrrd | Self::Bricks => {
                 4 * (17 + more)
             }
         };
-        let whole = if self == Self::Sog { SOG } else { 0 };
+        let whole = match self {
+            Self::Sog => SOG,
+            Self::StreamedSog => SOG * (4 + count as u64 / SOG),
+            _ => 0,
+        };
         whole + count as u64 * of_one
     }
 }
@@ -75,8 +84,8 @@ impl<W: Watch> Work<'_, W> {
         self.watch.stage(&format!("Writing {}", self.output.display()));
         let start = Instant::now();
         let version = self.conversion.spz_version;
-        target.write(&set, self.output, version).map_err(|error| self.at_fault(error))?;
         let (splats, degree) = (set.len(), set.degree);
+        target.write(set, self.output, version).map_err(|error| self.at_fault(error))?;
         Ok(Converted::Gaussians { points, splats, degree, read_ms, write_ms: milliseconds(start) })
     }
 

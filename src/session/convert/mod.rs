@@ -117,6 +117,8 @@ pub enum Target {
     Spz,
     /// Gaussians as SOG, in one file or as `meta.json` with its planes.
     Sog,
+    /// Gaussians in levels of detail as streamed SOG, `lod-meta.json` with its folders.
+    StreamedSog,
     /// Gaussians as glTF, `.glb`.
     Glb,
     /// Points with their attributes: LAS, LAZ, E57, or PLY as `.points.ply`.
@@ -154,10 +156,11 @@ impl Target {
         let has_stem = path.extension().is_some();
         let entry = all.into_iter().find(|(end, _)| has_stem && name.ends_with(end));
         let entry = entry.map(|(_, target)| target);
-        entry.or((name == "meta.json").then_some(Self::Sog)).ok_or_else(|| {
+        let index = (name == "lod-meta.json").then_some(Self::StreamedSog);
+        entry.or((name == "meta.json").then_some(Self::Sog)).or(index).ok_or_else(|| {
             Error::Argument(format!(
                 "{}: only .splk, .ply, .splat, .spz, .sog, .glb, .las, .laz, .e57, .nrrd and .splv \
-                 files, and the meta.json of SOG, can be written",
+                 files, and the meta.json or lod-meta.json of SOG, can be written",
                 path.display()
             ))
         })
@@ -485,6 +488,7 @@ mod tests {
         assert_eq!(of("b.compressed.ply"), Some(Target::CompressedPly));
         assert_eq!(of("b.v2.ply"), Some(Target::Ply));
         assert_eq!([of("a.sog"), of("a/meta.json")], [Some(Target::Sog); 2]);
+        assert_eq!(of("a/lod-meta.json"), Some(Target::StreamedSog));
         assert_eq!([of("b.obj"), of("splk"), of(".splk"), of("a.meta.json")], [None; 4]);
     }
 }

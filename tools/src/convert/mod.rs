@@ -37,9 +37,10 @@ pub struct Convert {
     files: Vec<PathBuf>,
     /// Write to this file. Meshes, point clouds, hierarchies and trained Gaussians become .splk, a
     /// hierarchy of splats; or 3D Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz,
-    /// .sog, meta.json with its planes beside it, or .glb. Meshes and point clouds become points
-    /// with all their attributes: .las, .laz or .points.ply; or with colours and intensities alone:
-    /// .e57. A volume becomes .nrrd, or .splv, levels of bricks that are read one by one.
+    /// .sog, meta.json with its planes beside it, lod-meta.json with levels of detail in folders
+    /// beside it, or .glb. Meshes and point clouds become points with all their attributes: .las,
+    /// .laz or .points.ply; or with colours and intensities alone: .e57. A volume becomes .nrrd, or
+    /// .splv, levels of bricks that are read one by one.
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["plan", "part"])]
     output: Option<PathBuf>,
     /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer

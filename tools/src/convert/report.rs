@@ -15,26 +15,23 @@ use std::{
     sync::{MutexGuard, PoisonError},
 };
 
-impl Convert {
-    /// Returns the bytes of the output, with the planes that a `meta.json` names.
-    fn bytes(&self) -> Result<u64, Failure> {
-        let size = |path: &Path| {
-            let metadata = path.metadata().map_err(|error| Error::file(path, "read", error));
-            metadata.map(|metadata| metadata.len())
-        };
-        let (path, mut all) = (self.output(), size(self.output())?);
-        if path.extension().is_some_and(|extension| extension == "json") {
-            let text = std::fs::read(path).map_err(|error| Error::file(path, "read", error))?;
-            let meta: Value = serde_json::from_slice(&text).unwrap_or_default();
-            let parts = meta.as_object().into_iter().flat_map(|meta| meta.values());
-            let planes = parts.filter_map(|part| part["files"].as_array()).flatten();
-            for plane in planes.filter_map(Value::as_str) {
-                all += size(&path.with_file_name(plane))?;
-            }
+/// Returns the bytes of an output, with the files that a `meta.json` or `lod-meta.json` names.
+fn bytes_of(path: &Path) -> Result<u64, Error> {
+    let unread = |error| Error::file(path, "read", error);
+    let mut all = path.metadata().map_err(unread)?.len();
+    if path.extension().is_some_and(|extension| extension == "json") {
+        let text = std::fs::read(path).map_err(unread)?;
+        let meta: Value = serde_json::from_slice(&text).unwrap_or_default();
+        let parts = meta.as_object().into_iter().flat_map(|meta| meta.values());
+        let planes = parts.map(|part| &part["files"]).chain([&meta["filenames"]]);
+        for name in planes.filter_map(Value::as_array).flatten().filter_map(Value::as_str) {
+            all += bytes_of(&path.with_file_name(name))?;
         }
-        Ok(all)
     }
+    Ok(all)
+}
 
+impl Convert {
     /// Returns what edits have done.
     fn changes(&self) -> MutexGuard<'_, Vec<Change>> {
         self.changes.lock().unwrap_or_else(PoisonError::into_inner)
@@ -82,7 +79,7 @@ impl Convert {
         attributes: &[String],
         total_ms: f64,
     ) -> Result<(), Failure> {
-        let bytes = self.bytes()?;
+        let bytes = bytes_of(self.output())?;
         let per_point = bytes as f64 / written.max(1) as f64;
         if self.json {
             return self.report(json!({
@@ -105,7 +102,7 @@ impl Convert {
 
     fn print_built(&self, built: &Built) -> Result<(), Failure> {
         let &Built { points, splats, closed, read_ms, splats_ms, build_ms } = built;
-        let bytes = self.bytes()?;
+        let bytes = bytes_of(self.output())?;
         let per_point = bytes as f64 / points as f64;
         if self.json {
             return self.report(json!({
@@ -134,7 +131,7 @@ impl Convert {
         done: &external::Converted,
         total_ms: f64,
     ) -> Result<(), Failure> {
-        let bytes = self.bytes()?;
+        let bytes = bytes_of(self.output())?;
         let per_point = bytes as f64 / done.points as f64;
         if self.json {
             return self.report(json!({
@@ -158,7 +155,7 @@ impl Convert {
         let &Converted::Gaussians { points, splats, degree, read_ms, write_ms } = converted else {
             return Ok(());
         };
-        let bytes = self.bytes()?;
+        let bytes = bytes_of(self.output())?;
         let per_splat = bytes as f64 / splats.max(1) as f64;
         if self.json {
             return self.report(json!({
@@ -209,7 +206,7 @@ impl Convert {
         total_ms: f64,
     ) -> Result<(), Failure> {
         let (lattice, scalar) = volume;
-        let bytes = self.bytes()?;
+        let bytes = bytes_of(self.output())?;
         let per_sample = bytes as f64 / lattice.len() as f64;
         if self.json {
             return self.report(json!({
