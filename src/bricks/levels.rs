@@ -148,6 +148,32 @@ impl Leveled {
         !value.is_finite() || self.missing == Some(value)
     }
 
+    /// Returns the first sample of a brick with those around it, and how many there are.
+    fn part(&self, number: usize, brick: u32) -> [[usize; 3]; 2] {
+        let level = self.levels[number];
+        let place = level.place(brick);
+        let from = place.map(|at| (at * SIDE).saturating_sub(REACH));
+        let end = |axis: usize| ((place[axis] + 1) * SIDE + REACH).min(level.dims[axis]);
+        [from, [0, 1, 2].map(|axis| end(axis) - from[axis])]
+    }
+
+    /// Reads the chunks of bricks that are read soon. Bricks that do not exist are left out.
+    pub fn fetch(&self, bricks: impl Iterator<Item = (usize, u32)>) {
+        let mut parts = vec![Vec::new(); self.field.levels().len()];
+        for (number, brick) in bricks {
+            let exists = self.levels.get(number).is_some_and(|l| (brick as usize) < l.bricks());
+            let Some(&Origin::Image(level, ratio)) = self.sources.get(number).filter(|_| exists)
+            else {
+                continue;
+            };
+            let (_, part) = self.spans((level, ratio), self.part(number, brick));
+            parts[level].push(part);
+        }
+        for (level, parts) in parts.iter().enumerate().filter(|(_, parts)| !parts.is_empty()) {
+            self.field.fetch(level, parts);
+        }
+    }
+
     /// Reads a brick.
     ///
     /// # Errors
@@ -155,10 +181,7 @@ impl Leveled {
     pub fn read(&self, number: usize, brick: u32) -> Result<Brick> {
         let level = self.levels[number];
         let place = level.place(brick);
-        let from = place.map(|at| (at * SIDE).saturating_sub(REACH));
-        let to: [usize; 3] =
-            std::array::from_fn(|axis| ((place[axis] + 1) * SIDE + REACH).min(level.dims[axis]));
-        let count = [0, 1, 2].map(|axis| to[axis] - from[axis]);
+        let [from, count] = self.part(number, brick);
         let samples = self.window(number, [from, count])?;
         let scalar = self.field.scalar();
         let slices =
@@ -185,20 +208,30 @@ impl Leveled {
         }
     }
 
-    /// Returns the means of samples of a level of the image.
-    fn means(
+    /// Returns for each sample of a box, along each axis, the first and the last sample of the image
+    /// behind it; and the box of the image that has all of them.
+    fn spans(
         &self,
         (level, ratio): (usize, [f64; 3]),
         [from, count]: [[usize; 3]; 2],
-    ) -> Result<Vec<u8>> {
+    ) -> ([Vec<[usize; 2]>; 3], [[usize; 3]; 2]) {
         let dims = self.field.levels()[level].dims;
-        // For each sample along each axis, the first and the last sample of the image behind it.
         let spans: [Vec<[usize; 2]>; 3] = std::array::from_fn(|axis| {
             let span = |at: usize| span(from[axis] + at, ratio[axis], dims[axis]);
             (0..count[axis]).map(span).collect()
         });
         let first = spans.each_ref().map(|spans| spans[0][0]);
         let size = [0, 1, 2].map(|axis| spans[axis][count[axis] - 1][1] - first[axis]);
+        (spans, [first, size])
+    }
+
+    /// Returns the means of samples of a level of the image.
+    fn means(
+        &self,
+        (level, ratio): (usize, [f64; 3]),
+        [from, count]: [[usize; 3]; 2],
+    ) -> Result<Vec<u8>> {
+        let (spans, [first, size]) = self.spans((level, ratio), [from, count]);
         let samples = self.field.window(level, [first, size], &|| Ok(()))?;
         let is_same = size == count && spans.iter().flatten().all(|[from, to]| to - from == 1);
         let has_holes = self.missing.is_some() || matches!(samples, Samples::F32(_));

@@ -410,6 +410,11 @@ impl Bricks {
     /// Fetches bricks of a remote object together, which are read soon. Leaves out those that do
     /// not exist.
     pub(super) fn fetch(&self, bricks: impl Iterator<Item = (usize, u32)>) -> Result<()> {
+        #[cfg(feature = "zarr")]
+        if let Origin::Leveled(leveled) = &self.origin {
+            leveled.fetch(bricks);
+            return Ok(());
+        }
         let Origin::File(bytes) = &self.origin else { return Ok(()) };
         let exists = |&(level, brick): &(usize, u32)| {
             self.levels().get(level).is_some_and(|size| (brick as usize) < size.bricks())

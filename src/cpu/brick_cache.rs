@@ -17,7 +17,7 @@ pub const BESIDE: usize = 2;
 pub const SLOT_SIDE: usize = SIDE + 2 * BESIDE;
 pub const SLOT: usize = SLOT_SIDE * SLOT_SIDE * SLOT_SIDE;
 /// Number of bricks read together.
-const BATCH: usize = 64;
+const BATCH: usize = 256;
 
 /// A brick's level and number.
 type Key = (usize, u32);

@@ -16,6 +16,11 @@ pub trait Objects: Send + Sync {
 
     /// Returns the path of an object, for errors.
     fn place(&self, key: &str) -> PathBuf;
+
+    /// Returns how many objects are best read at the same time.
+    fn at_once(&self) -> usize {
+        crate::parallel::current_num_threads()
+    }
 }
 
 /// A part of an object.
@@ -71,10 +76,10 @@ impl Array {
         if self.layout.fill.iter().any(|byte| *byte != 0) {
             out.chunks_exact_mut(element).for_each(|to| to.copy_from_slice(&self.layout.fill));
         }
-        let places = self.places(from, count);
-        for batch in places.chunks(2 * crate::parallel::current_num_threads()) {
+        let places = self.places([from, count]);
+        for batch in places.chunks(2 * self.store.at_once()) {
             check()?;
-            let chunks: Vec<Result<Chunk>> = batch.par_iter().map(|place| read(place)).collect();
+            let chunks = self.read_all(batch, read);
             for (place, chunk) in batch.iter().zip(chunks) {
                 if let Some(chunk) = chunk? {
                     self.copy(place, &chunk, [from, count], &mut out);
@@ -84,8 +89,35 @@ impl Array {
         Ok(out)
     }
 
+    /// Reads chunks, as many at the same time as the store likes.
+    pub fn read_all(
+        &self,
+        places: &[Vec<usize>],
+        read: &(dyn Fn(&[usize]) -> Result<Chunk> + Sync),
+    ) -> Vec<Result<Chunk>> {
+        let threads = self.store.at_once().min(places.len());
+        if threads <= crate::parallel::current_num_threads() {
+            return places.par_iter().map(|place| read(place)).collect();
+        }
+        // They wait for a server most of the time, so they are more than the processors.
+        let mut chunks: Vec<Option<Result<Chunk>>> = places.iter().map(|_| None).collect();
+        let next = Mutex::new(places.iter().zip(&mut chunks));
+        let work = || {
+            let take = || next.lock().unwrap_or_else(PoisonError::into_inner).next();
+            while let Some((place, chunk)) = take() {
+                *chunk = Some(read(place));
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(work);
+            }
+        });
+        chunks.into_iter().flatten().collect()
+    }
+
     /// Returns the places of the chunks that a box meets.
-    fn places(&self, from: &[usize], count: &[usize]) -> Vec<Vec<usize>> {
+    pub fn places(&self, [from, count]: [&[usize]; 2]) -> Vec<Vec<usize>> {
         let chunk = &self.layout.chunk;
         let first: Vec<usize> = from.iter().zip(chunk).map(|(at, n)| at / n).collect();
         let last: Vec<usize> =

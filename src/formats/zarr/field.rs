@@ -36,6 +36,11 @@ impl Field {
         }
     }
 
+    /// Reads the chunks of some boxes of samples that are read soon.
+    pub fn fetch(&self, level: usize, parts: &[[[usize; 3]; 2]]) {
+        self.image.fetch((level, [self.channel, self.time]), parts);
+    }
+
     /// Returns a box of samples of a level, x fastest.
     ///
     /// # Errors

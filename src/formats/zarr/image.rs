@@ -2,7 +2,7 @@
 
 use super::{
     array::Layout,
-    chunks::{Array, Cache, Check},
+    chunks::{Array, Cache, Check, Chunk},
     nodes::{Found, Node},
     ome::{self, Axis, Shown},
     store::{Store, joined, shared},
@@ -144,20 +144,14 @@ impl Image {
         Ok(Self { levels, channels, active, times, unit, is_ome, labels, axes, cache })
     }
 
-    /// Returns the elements of a box of samples of a level, and the steps between them along x, y
-    /// and z. Kept chunks are used if `is_part`, and chunks are kept.
-    ///
-    /// # Errors
-    /// Those of reading chunks, and of `check`.
-    pub fn elements(
+    /// Returns the first element of a box of samples of a level, of a channel at a time, and the
+    /// numbers of elements, along the axes of the array.
+    fn of_axes(
         &self,
         (level, [channel, time]): (usize, [usize; 2]),
         [from, count]: [[usize; 3]; 2],
-        is_part: bool,
-        check: Check,
-    ) -> Result<(Vec<u8>, [usize; 3])> {
-        let array = &self.levels[level].array;
-        let axes = array.layout.shape.len();
+    ) -> [Vec<usize>; 2] {
+        let axes = self.levels[level].array.layout.shape.len();
         let (mut first, mut size) = (vec![0; axes], vec![1; axes]);
         for (at, axis) in self.axes.space.into_iter().enumerate() {
             if let Some(axis) = axis {
@@ -169,9 +163,50 @@ impl Image {
                 first[axis] = at;
             }
         }
+        [first, size]
+    }
+
+    /// Returns a chunk, and keeps it for a while.
+    fn kept(&self, level: usize, place: &[usize]) -> Result<Chunk> {
+        let array = &self.levels[level].array;
         let bytes = array.layout.chunk_bytes().unwrap_or(usize::MAX);
+        self.cache.get((level, place.to_vec()), bytes, || array.chunk(place))
+    }
+
+    /// Reads the chunks of some boxes of samples that are read soon, all at once, as many as are
+    /// kept. Those that cannot be read are tried again then.
+    pub fn fetch(&self, which: (usize, [usize; 2]), parts: &[[[usize; 3]; 2]]) {
+        let (level, _) = which;
+        let array = &self.levels[level].array;
+        let mut places: Vec<Vec<usize>> = Vec::new();
+        for part in parts {
+            let [first, size] = self.of_axes(which, *part);
+            places.extend(array.places([&first, &size]));
+        }
+        places.sort_unstable();
+        places.dedup();
+        let bytes = array.layout.chunk_bytes().unwrap_or(usize::MAX);
+        places.truncate(CACHED / 2 / bytes.max(1));
+        array.read_all(&places, &|place| self.kept(level, place));
+    }
+
+    /// Returns the elements of a box of samples of a level, and the steps between them along x, y
+    /// and z. Kept chunks are used if `is_part`, and chunks are kept.
+    ///
+    /// # Errors
+    /// Those of reading chunks, and of `check`.
+    pub fn elements(
+        &self,
+        which: (usize, [usize; 2]),
+        part: [[usize; 3]; 2],
+        is_part: bool,
+        check: Check,
+    ) -> Result<(Vec<u8>, [usize; 3])> {
+        let (level, _) = which;
+        let array = &self.levels[level].array;
+        let [first, size] = self.of_axes(which, part);
         let read = |place: &[usize]| match is_part {
-            true => self.cache.get((level, place.to_vec()), bytes, || array.chunk(place)),
+            true => self.kept(level, place),
             false => array.chunk(place),
         };
         let elements = array.window([&first, &size], &read, check)?;

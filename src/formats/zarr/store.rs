@@ -18,6 +18,9 @@ use std::{
 };
 use zip::{CompressionMethod, ZipArchive};
 
+/// Objects of a server that are read at the same time.
+const AT_ONCE: usize = 16;
+
 /// Most bytes of a file of metadata, and of an object that is unpacked.
 const MOST_TEXT: u64 = 32 << 20;
 const MOST_OBJECT: u64 = 4 << 30;
@@ -191,6 +194,13 @@ impl Objects for Store {
         })?;
         let all = unpacked.len() as u64;
         self.part_of(key, &Bytes::Held(unpacked), part, 0..all).map(Some)
+    }
+
+    fn at_once(&self) -> usize {
+        match self.place {
+            Place::Server => AT_ONCE,
+            _ => crate::parallel::current_num_threads(),
+        }
     }
 
     fn place(&self, key: &str) -> PathBuf {

@@ -2,7 +2,9 @@
 //! damaged ones.
 
 use super::{
+    array::Layout,
     blosc,
+    chunks::{Array, Objects, Part},
     codecs::{Chain, Codec, crc32c},
     read as read_source,
 };
@@ -17,7 +19,13 @@ use crate::{
 };
 use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
 use serde_json::{Value, json};
-use std::{fs, io::Write, path::Path};
+use std::{
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+    sync::{Arc, Condvar, Mutex},
+    time::Duration,
+};
 
 /// Writes a file of a store, and the folders around it.
 fn put(folder: &Folder, name: &str, bytes: impl AsRef<[u8]>) {
@@ -448,6 +456,41 @@ fn words_of_python_for_numbers_are_read() {
     put(&folder, "a.zarr/.zattrs", "{\"NaN \\\"\": [NaN, -Infinity, \"Infinity\"]}");
     put(&folder, "a.zarr/0.0.0", [1f32.to_le_bytes(), 2f32.to_le_bytes()].concat());
     assert_eq!(values(&load(&folder, "a.zarr", &ReadOptions::default()).unwrap()), [1.0, 2.0]);
+}
+
+/// A server whose objects are their own names, and which answers once eight are asked for.
+#[derive(Default)]
+struct Slow {
+    asked: Mutex<usize>,
+    changed: Condvar,
+}
+
+impl Objects for Slow {
+    fn get(&self, key: &str, _: Part) -> Result<Option<Vec<u8>>> {
+        let mut asked = self.asked.lock().unwrap();
+        *asked += 1;
+        self.changed.notify_all();
+        let wait = Duration::from_secs(20);
+        let (_, waited) = self.changed.wait_timeout_while(asked, wait, |asked| *asked < 8).unwrap();
+        assert!(!waited.timed_out(), "objects are read one after the other");
+        Ok((key != "n/3").then(|| key.as_bytes()[2..].to_vec()))
+    }
+
+    fn place(&self, key: &str) -> PathBuf {
+        key.into()
+    }
+
+    fn at_once(&self) -> usize {
+        8
+    }
+}
+
+#[test]
+fn chunks_of_a_server_are_read_at_the_same_time() {
+    let layout = Layout::of(&zarray(&[8], &[1], "|u1", json!({"fill_value": 46}))).unwrap();
+    let array = Array::new(Arc::new(Slow::default()), "n", layout);
+    let bytes = array.window([&[0], &[8]], &|place| array.chunk(place), &|| Ok(())).unwrap();
+    assert_eq!(bytes, *b"012.4567");
 }
 
 #[test]
