@@ -223,8 +223,9 @@ fn two_colors() -> Gaussians {
             + Vec3::X * 1e4 * (i / 1000) as f32;
         at * 0.5
     };
-    let color =
-        |i: usize| if (i / 2 + i / 20) % 2 == 0 { [1.5, -1.5, 0.0] } else { [-1.5, 0.0, 1.5] };
+    let color = |i: usize| {
+        if (i / 2 + i / 20).is_multiple_of(2) { [1.5, -1.5, 0.0] } else { [-1.5, 0.0, 1.5] }
+    };
     Gaussians {
         centers: (0..count).map(place).collect(),
         scales: vec![Vec3::new(0.3, 0.3, 0.05); count],

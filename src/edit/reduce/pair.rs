@@ -175,7 +175,7 @@ mod tests {
         for axis in 0..3 {
             let [a, b, merged] = [a, b, &merged.shape].map(|s| (Flat::along(s, axis), s.opacity));
             for pixel in 0..400 * 400 {
-                let at = DVec2::new((pixel % 400) as f64, (pixel / 400) as f64);
+                let at = DVec2::new(f64::from(pixel % 400), f64::from(pixel / 400));
                 let at = (at - 199.5) * step;
                 let cover = |(flat, opacity): &(Flat, f64)| {
                     let away = at - flat.center;

@@ -471,7 +471,7 @@ impl Objects for Slow {
         *asked += 1;
         self.changed.notify_all();
         let wait = Duration::from_secs(20);
-        let (_, waited) = self.changed.wait_timeout_while(asked, wait, |asked| *asked < 8).unwrap();
+        let waited = self.changed.wait_timeout_while(asked, wait, |asked| *asked < 8).unwrap().1;
         assert!(!waited.timed_out(), "objects are read one after the other");
         Ok((key != "n/3").then(|| key.as_bytes()[2..].to_vec()))
     }

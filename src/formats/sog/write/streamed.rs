@@ -274,7 +274,7 @@ mod tests {
         let path = folder.path(INDEX);
         let levels = [square(400, 1.0), square(200, 0.6), square(20, 0.2)];
         write(&levels, &path).unwrap();
-        let index: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        let index: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(index["counts"], json!([160_000, 40_000, 400]));
         // More than one file of the finest level, and one of the others.
         assert_eq!(index["filenames"].as_array().unwrap().len(), 4);
@@ -320,7 +320,7 @@ mod tests {
         let mut set = square(200, 1.0);
         set.centers.fill(Vec3::ONE);
         write(&[set], &path).unwrap();
-        let index: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        let index: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(index["tree"]["lods"]["0"]["count"], 40_000);
         assert_eq!(read_with(&path, read).unwrap().len(), 40_000);
     }
