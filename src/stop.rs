@@ -11,7 +11,8 @@ use std::{
 /// A request to stop drawing a picture, which another thread may make. Clones share it.
 ///
 /// The CPU engine looks at it before each block of tiles, and then ends with
-/// [`Error::Stopped`](crate::Error::Stopped). The GPU engine finishes its frame.
+/// [`Error::Stopped`](crate::Error::Stopped). The GPU engine finishes its frame; only
+/// [`render_async`](crate::Renderer::render_async) looks at it, before each batch.
 #[derive(Debug, Clone, Default)]
 pub struct Stop(Arc<State>);
 

@@ -169,7 +169,8 @@ impl Renderer {
     /// itself. Elsewhere, someone must poll it meanwhile ([`wgpu::Device::poll`]).
     ///
     /// # Errors
-    /// Those of [`Self::render`].
+    /// Those of [`Self::render`]; [`Error::Stopped`] if the settings ask for the end before a
+    /// batch.
     pub async fn render_async(
         &mut self,
         prepared: &mut PreparedScene,
@@ -178,6 +179,10 @@ impl Renderer {
     ) -> Result<(Picture, FrameStats)> {
         let mut frame = self.begin(prepared, viewpoint, settings, empty_picture(settings))?;
         loop {
+            // What is on the device stays sound: another picture may follow.
+            if settings.controls.stop.is_requested() {
+                return Err(Error::Stopped);
+            }
             let mut encoder = self.encoder();
             self.encode_next(&mut encoder, prepared, &mut frame)?;
             self.engine.gpu.queue.submit([encoder.finish()]);

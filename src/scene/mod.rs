@@ -167,7 +167,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`] if the scene has no such field; [`Error::Transfer`] if
     /// [`validate`](Self::validate) would refuse the function.
-    pub(crate) fn with_transfer(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
+    pub fn with_transfer(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
         let Some(item) = scene.items.get_mut(number) else { return Err(poses::no_item(number)) };
         let Some(function) = item.transfer_mut() else {

@@ -177,9 +177,11 @@ impl Gpu {
         if let Some(reason) = self.condition.lost.get() {
             return Err(Error::DeviceLost(format!("{} was lost: {reason}", self.info.name)));
         }
-        if let Some(stray) = lock(&self.condition.stray).take() {
-            return Err(Error::Driver(stray));
+        let stray = lock(&self.condition.stray).take();
+        // What is made of an invalid pipeline is a stray error. The answer says why it is invalid.
+        if let Some(complaint) = self.answers.late() {
+            return Err(self.driver_error(complaint));
         }
-        self.answers.late().map_or(Ok(()), |complaint| Err(self.driver_error(complaint)))
+        stray.map_or(Ok(()), |stray| Err(Error::Driver(stray)))
     }
 }

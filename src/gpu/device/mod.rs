@@ -74,9 +74,13 @@ impl std::str::FromStr for AdapterChoice {
 }
 
 /// What the user can do if no adapter is found.
+#[cfg(not(target_arch = "wasm32"))]
 const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, use the CPU engine, which \
     draws the same pictures, or Mesa's software driver (Debian and Ubuntu: apt-get install \
     mesa-vulkan-drivers libvulkan1)";
+#[cfg(target_arch = "wasm32")]
+const NO_ADAPTER_HELP: &str = "this browser has no WebGPU for this machine; use the CPU engine, \
+    which draws the same pictures";
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
@@ -272,7 +276,12 @@ impl Gpu {
         let (device, queue) = adapter.request_device(&descriptor).await.map_err(|e| {
             Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name))
         })?;
-        Ok(Self::from_wgpu(device, queue, adapter.get_info()))
+        let mut info = adapter.get_info();
+        if info.name.is_empty() {
+            // Browsers keep the names of adapters to themselves.
+            info.name = "WebGPU".into();
+        }
+        Ok(Self::from_wgpu(device, queue, info))
     }
 
     /// Uses a device that the host application owns. It must keep WebGPU's default limits. Call

@@ -61,7 +61,11 @@ impl Readback {
             None => Ok(None),
             Some(true) => {
                 let view = self.staging.get_mapped_range(..);
-                Ok(Some(view.map_err(|error| Error::Driver(error.to_string()))?.to_vec()))
+                let bytes = view.map_err(|error| Error::Driver(error.to_string()))?.to_vec();
+                // A browser would keep the memory until it collects its garbage. It asks once.
+                #[cfg(target_arch = "wasm32")]
+                self.staging.destroy();
+                Ok(Some(bytes))
             }
             Some(false) => {
                 gpu.sound()?;
