@@ -31,44 +31,50 @@
 // See progress.wgsl.
 @group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
-// Values of each field on the plane behind the sheet that is being closed, for differences between
-// neighbouring pixels.
-var<workgroup> neighbours: array<array<f32, 64>, FIELDS>;
-// The slopes of these values, per pixel.
+// The slopes of each field on the plane behind the sheet that is being closed, per pixel.
 var<private> slopes: array<array<vec2<f32>, FIELDS>, ROWS>;
-// Whether an invocation of the tile stopped, and the tile's slot.
+// The tile, and how far it is.
+var<workgroup> begun: vec2<u32>;
+// Whether an invocation of the tile stopped, and the tile's slot then.
 var<workgroup> any_stopped: atomic<u32>;
 var<workgroup> tile_slot: u32;
 
+// The slot of a tile that did not stop.
+const NOT_STOPPED: u32 = NO_SLOT - 1u;
+
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
-    let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
-    let number = dealt(group_number(group), tile_count);
-    if number >= tile_count {
-        return;
-    }
-    let tile = atomicLoad(&progress[listed_tile(number)]);
-    let column = tile % frame.tiles.x;
-    let row = tile / frame.tiles.x;
-    let resumed = atomicLoad(&progress[tile]);
-    begin_field(tile);
-    if CAN_STOP {
+    // One invocation asks for all, because browsers accept barriers only where the answers are
+    // alike. It is also the only one that changes the tile's progress.
+    let is_first = all(lane.xy == vec2(0u));
+    if is_first {
+        let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
+        let number = dealt(group_number(group), tile_count);
+        begun = vec2(0u, FINISHED);
+        if number < tile_count {
+            let listed = atomicLoad(&progress[listed_tile(number)]);
+            begun = vec2(listed, atomicLoad(&progress[listed]));
+        }
         // Workgroup memory may hold anything at first.
-        if all(lane.xy == vec2(0u)) {
+        if CAN_STOP {
             atomicStore(&any_stopped, 0u);
         }
-        workgroupBarrier();
+        begin_loads();
     }
-    // All lanes must read the tile's progress before one of them changes it, and see that change
-    // before another one.
-    storageBarrier();
+    let found = workgroupUniformLoad(&begun);
+    let tile = found.x;
+    let resumed = found.y;
     if resumed == FINISHED {
         return;
     }
-    if all(lane.xy == vec2(0u)) {
+    let column = tile % frame.tiles.x;
+    let row = tile / frame.tiles.x;
+    begin_field(tile);
+    // All lanes must read how far the field is before one of them changes it.
+    storageBarrier();
+    if is_first {
         atomicStore(&progress[tile], FINISHED);
     }
-    storageBarrier();
     let corner = vec2<i32>(vec2(column, row)) * TILE_STEP - APRON;
     let first_pixel = corner + vec2<i32>(i32(lane.x), i32(lane.y * ROWS));
     for (var r = 0u; r < ROWS; r++) {
@@ -88,6 +94,10 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     if bin > 0u {
         at = bin_end(bin - 1u);
     }
+    // The tile's entries from `first` on are in workgroup memory up to `loaded`.
+    var first = at;
+    var loaded = end;
+    var turn = 0u;
     var front = stage.first_sheet - 1u;
     // Number of sheets, from `front` on, that may have sums.
     var open = 0u;
@@ -101,13 +111,6 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     var group_end = bin_end(bin);
     var entries_left = MOST_ENTRIES;
     var stopped = false;
-    // The tile's entries from `first` on are in workgroup memory up to `loaded`.
-    var first = at;
-    var loaded = end;
-    var turn = 0u;
-    if STAGED && all(lane.xy == vec2(0u)) {
-        begin_loads();
-    }
     loop {
         if STAGED {
             if first >= end {
@@ -201,36 +204,25 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             pass_field_before(stage.end_sheet);
         }
     }
+    var tells = is_first;
     if CAN_STOP {
         if stopped {
             atomicStore(&any_stopped, 1u);
         }
         workgroupBarrier();
-        if atomicLoad(&any_stopped) > 0u {
-            if all(lane.xy == vec2(0u)) {
-                tile_slot = resumed - 1u;
-                if resumed == 0u {
-                    tile_slot = claim_slot();
-                }
-                atomicStore(&progress[tile], tile_slot + 1u);
-                atomicStore(&progress[progress_word(UNFINISHED)], 1u);
-                atomicAdd(&progress[progress_word(STOPS)], select(1u, 0u, tile_slot == NO_SLOT));
-            }
-            workgroupBarrier();
-            if tile_slot == NO_SLOT {
-                // The tile starts again, from the pixels stored in the picture.
-                return;
-            }
-            save(tile_slot, lane.xy, vec4(at, bin, front, open));
-        } else if resumed > 0u && all(lane.xy == vec2(0u)) {
-            free_slot(resumed - 1u);
+        if is_first {
+            tile_slot = slot_after(tile, resumed);
         }
-    }
-
-    var tells = all(lane.xy == vec2(0u));
-    if CAN_STOP && atomicLoad(&any_stopped) > 0u {
-        // The others are opaque, and see no more of the field.
-        tells = stopped;
+        let slot = workgroupUniformLoad(&tile_slot);
+        if slot == NO_SLOT {
+            // The tile starts again, from the pixels stored in the picture.
+            return;
+        }
+        if slot != NOT_STOPPED {
+            save(slot, lane.xy, vec4(at, bin, front, open));
+            // The others are opaque, and see no more of the field.
+            tells = stopped;
+        }
     }
     if tells {
         end_field(tile);
@@ -243,6 +235,25 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             store_pixel(r, u32(pixel.y) * frame.size.x + u32(pixel.x));
         }
     }
+}
+
+// Returns the slot of a tile, if an invocation stopped, and notes that the tile is not finished.
+// Otherwise its slot is free again.
+fn slot_after(tile: u32, resumed: u32) -> u32 {
+    if atomicLoad(&any_stopped) == 0u {
+        if resumed > 0u {
+            free_slot(resumed - 1u);
+        }
+        return NOT_STOPPED;
+    }
+    var slot = resumed - 1u;
+    if resumed == 0u {
+        slot = claim_slot();
+    }
+    atomicStore(&progress[tile], slot + 1u);
+    atomicStore(&progress[progress_word(UNFINISHED)], 1u);
+    atomicAdd(&progress[progress_word(STOPS)], select(1u, 0u, slot == NO_SLOT));
+    return slot;
 }
 
 // Adds the entries from `first` on that lie in sheet `entry_sheet` and belong to field `f`.
@@ -356,50 +367,6 @@ fn close_field(r: u32, f: u32, sheet: u32, mixture: ptr<function, Mixture>) {
         pixels[r].fields[f].front = field.back;
     }
     mix_field(r, f, sheet, field, mixture);
-}
-
-// Finds the slopes on the plane behind the sheet being closed, from the values of the tile's
-// neighbouring pixels. Both barriers are here, and the sheet is closed behind them: with a barrier
-// behind the code that closes it, Mesa's software Vulkan loses the slopes once that code is long.
-fn find_slopes(lane: vec2<u32>) {
-    for (var r = 0u; r < ROWS; r++) {
-        let at = (lane.y * ROWS + r) * 8u + lane.x;
-        for (var f = 0u; f < FIELDS; f++) {
-            let weight = pixels[r].fields[f].face_weight.x;
-            neighbours[f][at] = select(
-                NO_VALUE,
-                pixels[r].fields[f].face_value.x / max(weight, 1e-37),
-                weight > frame.fields[f].isotropic.w,
-            );
-        }
-    }
-    workgroupBarrier();
-    for (var r = 0u; r < ROWS; r++) {
-        for (var f = 0u; f < FIELDS; f++) {
-            slopes[r][f] = difference(lane, r, f);
-        }
-    }
-    workgroupBarrier();
-}
-
-// Returns the slopes of a field's values around a pixel: central differences, one-sided if a
-// neighbour has no value.
-fn difference(lane: vec2<u32>, r: u32, f: u32) -> vec2<f32> {
-    let y = lane.y * ROWS + r;
-    let middle = neighbours[f][y * 8u + lane.x];
-    let before = vec2(
-        neighbours[f][y * 8u + max(lane.x, 1u) - 1u],
-        neighbours[f][(max(y, 1u) - 1u) * 8u + lane.x],
-    );
-    let after = vec2(
-        neighbours[f][y * 8u + min(lane.x + 1u, 7u)],
-        neighbours[f][min(y + 1u, 7u) * 8u + lane.x],
-    );
-    let has_before = before > vec2(NO_VALUE);
-    let has_after = after > vec2(NO_VALUE);
-    let span = vec2<f32>(vec2<u32>(has_before) + vec2<u32>(has_after));
-    return (select(vec2(middle), after, has_after) - select(vec2(middle), before, has_before))
-        / max(span, vec2(1.0));
 }
 
 // Composites one splat, without sheets, in front of or behind the pixels so far.

@@ -69,7 +69,7 @@ fn refinement(wide: f32) -> u32 {
 
 fn has_children(node: Node) -> bool {
     return node.child_page != NO_PAGE
-        && (resident[node.child_page / 32u] >> (node.child_page % 32u) & 1u) != 0u;
+        && ((resident[node.child_page / 32u] >> (node.child_page % 32u)) & 1u) != 0u;
 }
 
 fn is_hidden(index: u32, node: Node) -> bool {

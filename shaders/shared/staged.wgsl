@@ -14,6 +14,7 @@ var<workgroup> staged_ends: array<u32, STAGED_ENTRIES>;
 var<workgroup> staged: array<vec4<f32>, STAGED_ENTRIES * STAGED_VECTORS>;
 // Whether light passes any pixel of the tile: of this load and of the next, in turn.
 var<workgroup> is_light: array<atomic<u32>, 2>;
+var<workgroup> any_light: u32;
 // The place of the first of these entries.
 var<private> staged_first: u32;
 
@@ -29,7 +30,7 @@ fn staged_end(at: u32) -> u32 {
     return staged_ends[at - staged_first];
 }
 
-// One lane calls it before the first load.
+// One lane calls it, and a barrier follows before the first load.
 fn begin_loads() {
     atomicStore(&is_light[0], 0u);
 }
@@ -44,13 +45,14 @@ fn load_entries(
     light: bool,
     turn: u32,
 ) -> bool {
+    if light {
+        atomicStore(&is_light[turn], 1u);
+    }
     // Nobody reads the entries before any more.
     workgroupBarrier();
     if lane == 0u {
+        any_light = atomicLoad(&is_light[turn]);
         atomicStore(&is_light[1u - turn], 0u);
-    }
-    if light {
-        atomicStore(&is_light[turn], 1u);
     }
     staged_first = first;
     let at = first + lane;
@@ -67,8 +69,8 @@ fn load_entries(
             stage_general(lane, general_of(entry, near));
         }
     }
-    workgroupBarrier();
-    return atomicLoad(&is_light[turn]) != 0u;
+    // Alike in all lanes, as browsers demand where barriers follow.
+    return workgroupUniformLoad(&any_light) != 0u;
 }
 
 // Returns the bin of an entry: the first of the tile's that ends behind it.

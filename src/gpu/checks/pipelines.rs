@@ -194,7 +194,19 @@ fn write_hlsl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
     written.entry_point_names.into_iter().try_for_each(|name| name.map(drop).map_err(with_causes))
 }
 
-/// Pipelines that compile alike are checked once.
+/// Writes the shaders of pipelines for another compiler: tools/web/tests.mjs gives them to a
+/// browser's. Each begins with a comment that names its entry point.
+fn write_shaders<'a>(recipes: impl Iterator<Item = &'a Recipe>, folder: &Path) {
+    std::fs::create_dir_all(folder).expect("a folder");
+    for (number, recipe) in recipes.enumerate() {
+        let label = recipe.label.replace(' ', "-");
+        let text = format!("// {}\n{}", recipe.entry, source_of(recipe));
+        std::fs::write(folder.join(format!("{number}-{label}.wgsl")), text).expect("a shader");
+    }
+}
+
+/// Pipelines that compile alike are checked once. `SPLATKIT_SHADERS` names a folder for their
+/// shaders.
 #[test]
 fn every_pipeline_of_every_variant_compiles_for_every_backend() {
     let variants = &*variants::ALL;
@@ -211,6 +223,9 @@ fn every_pipeline_of_every_variant_compiles_for_every_backend() {
         distinct.entry(key).or_insert((recipe, named));
     }
     println!("{} variants, {pipelines} pipelines, {} distinct", variants.len(), distinct.len());
+    if let Some(folder) = std::env::var_os("SPLATKIT_SHADERS") {
+        write_shaders(distinct.values().map(|(recipe, _)| recipe), Path::new(&folder));
+    }
     let failure = |(recipe, named): &(Recipe, Option<&(&str, Variant)>)| {
         let error = check(recipe).err()?;
         let variant = named.map_or("any variant".into(), |(scene, variant)| {

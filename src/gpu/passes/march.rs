@@ -39,6 +39,7 @@ impl March {
             shaders::PIXEL,
             shaders::KERNELS,
             if variant.staged { shaders::STAGED } else { shaders::NO_STAGED },
+            if variant.central { shaders::SLOPES } else { shaders::NO_SLOPES },
             shaders::SHEET,
             variant.lamp_shader(),
             if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
