@@ -23,10 +23,17 @@ export type Part = Record<string, unknown>;
 
 export type Side = "" | "front" | "back" | "left" | "right" | "top" | "bottom" | "iso";
 
+/** What draws. */
+export interface Engine {
+  engine: "webgpu" | "cpu";
+  /** Why WebGPU does not draw; empty if it does. */
+  reason: string;
+}
+
 /** The details of the element's events. */
 export interface SplatkitViewerEventMap {
-  load: CustomEvent<{ summary: string; warnings: string[] }>;
-  frame: CustomEvent<{ width: number; height: number; isExact: boolean; milliseconds: number }>;
+  load: CustomEvent<{ summary: string; warnings: string[] } & Engine>;
+  frame: CustomEvent<{ width: number; height: number; isExact: boolean; milliseconds: number } & Engine>;
   rest: CustomEvent<Record<string, never>>;
   camerachange: CustomEvent<{ camera: Camera }>;
   fetched: CustomEvent<{ requests: number; bytes: number; cancelled: number; isBusy: boolean }>;

@@ -17,7 +17,7 @@ canvas:focus-visible { outline: 2px solid #4c8dff; }
 .status { left: .6rem; bottom: .6rem; pointer-events: none; }
 .problem { left: 50%; top: 50%; translate: -50% -50%; max-width: min(34rem, 80%);
   white-space: pre-wrap; }
-.help { right: .6rem; top: 2.9rem; margin: 0; }
+.help { right: .6rem; top: 2.9rem; margin: 0; max-width: 26rem; }
 .help td:first-child { padding-right: 1rem; font-weight: 600; }
 .tools { position: absolute; right: .6rem; top: .6rem; display: flex; gap: .3rem; }
 button { display: grid; place-items: center; width: 2rem; height: 2rem; padding: 0; border-radius: .4rem; font: inherit;
@@ -109,6 +109,7 @@ export class SplatkitViewer extends HTMLElement {
   #isOpen = false;
   #isExact = false;
   #isFetching = false;
+  #drawnBy;
   #wheel = null;
   #size = [0, 0];
 
@@ -140,6 +141,9 @@ export class SplatkitViewer extends HTMLElement {
       row.insertCell().textContent = hand;
       row.insertCell().textContent = does;
     }
+    const row = this.#help.insertRow();
+    row.insertCell().textContent = "drawn by";
+    this.#drawnBy = row.insertCell();
     this.#listen();
   }
 
@@ -255,7 +259,7 @@ export class SplatkitViewer extends HTMLElement {
       const buffers = [...files].map(([name, file]) => [name, file instanceof ArrayBuffer ? file : new URL(file, document.baseURI).href]);
       const moved = buffers.map(([, file]) => file).filter((file) => file instanceof ArrayBuffer);
       if (wasm) moved.push(wasm);
-      this.#worker.postMessage({ type: "open", wasm, scene: text, files: buffers, width, height }, moved);
+      this.#worker.postMessage({ type: "open", wasm, scene: text, files: buffers, engine: this.getAttribute("engine") ?? "auto", width, height }, moved);
     } catch (error) {
       if (opening === this.#opening) this.#complain(error.message, true);
     }
@@ -328,7 +332,9 @@ export class SplatkitViewer extends HTMLElement {
       this.#describe(message.summary);
       for (const name of ["camera", "transfer", "clips"]) this.#applyAttribute(name);
       this.#resize();
-      this.#tell("load", { summary: message.summary, warnings: message.warnings });
+      const { summary, warnings, engine, reason } = message;
+      this.#sayEngine(engine, reason);
+      this.#tell("load", { summary, warnings, engine, reason });
     }
   }
 
@@ -340,7 +346,11 @@ export class SplatkitViewer extends HTMLElement {
     this.#tell("fetched", { requests, bytes, cancelled, isBusy });
   }
 
-  #show({ width, height, isExact, milliseconds, camera, buffer }) {
+  #sayEngine(engine, reason) {
+    this.#drawnBy.textContent = engine === "webgpu" ? "WebGPU" : `the processor. ${reason}`;
+  }
+
+  #show({ width, height, isExact, milliseconds, camera, buffer, engine, reason }) {
     const pixels = new ImageData(new Uint8ClampedArray(buffer), width, height);
     const [wide, high] = this.#size;
     if (this.#canvas.width !== wide || this.#canvas.height !== high) {
@@ -357,7 +367,8 @@ export class SplatkitViewer extends HTMLElement {
     const isMoved = camera !== this.#cameraText;
     this.#cameraText = camera;
     this.#camera = JSON.parse(camera);
-    this.#tell("frame", { width, height, isExact, milliseconds });
+    this.#sayEngine(engine, reason);
+    this.#tell("frame", { width, height, isExact, milliseconds, engine, reason });
     if (isMoved) this.#tell("camerachange", { camera: this.camera });
   }
 

@@ -1,9 +1,15 @@
 // The worker that holds the engine: it hears the page, and draws strip by strip between messages.
 //
-// tools/web/build puts this behind the glue of wasm-bindgen, whose `initSync`, `Files` and `Viewer`
-// it uses, and behind ranges.js.
+// tools/web/build puts this behind the glue of wasm-bindgen, whose `initSync`, `Engine`, `Files` and
+// `Viewer` it uses, and behind ranges.js.
 
 let viewer = null;
+/** The GPU engine, once it was asked for. All scenes share its device, until that is lost. */
+let webgpu = null;
+/** What draws: its name, and why it is not WebGPU. */
+let drawn = { engine: "cpu", reason: "" };
+/** The viewer whose GPU is listened to. */
+let listening = null;
 /** What fetches files in parts. */
 let ranges = null;
 /** Counts the scenes that were opened. */
@@ -43,6 +49,24 @@ function complain(error) {
   postMessage({ type: "error", message: text, isFatal: isTrap || !viewer });
 }
 
+/** Waits for the GPU, and goes on then. */
+function listen() {
+  if (listening === viewer) return;
+  const mine = (listening = viewer);
+  mine.more().then(() => {
+    if (listening === mine) listening = null;
+    schedule();
+  });
+}
+
+/** Hears whether WebGPU still draws. If it gave up, the page is told why. */
+function hearEngine() {
+  if (drawn.engine === "cpu" || viewer.is_gpu()) return;
+  webgpu = null;
+  drawn = { engine: "cpu", reason: viewer.refusal() };
+  hint(`The processor draws from now on, because WebGPU failed: ${drawn.reason}`);
+}
+
 function applyDrags() {
   for (const [name, [x, y]] of drags) viewer[name](x, y);
   drags.clear();
@@ -53,6 +77,7 @@ function work() {
   try {
     applyDrags();
     const wait = viewer.step();
+    hearEngine();
     if (wait === -1) {
       if (!isResting) postMessage({ type: "rest" });
       isResting = true;
@@ -61,12 +86,13 @@ function work() {
     isResting = false;
     if (wait === -2) showFrame();
     if (wait === -2 || wait === -3) fetchMore();
+    if (wait === -4) listen();
     if (isRough && !viewer.is_rough()) {
       isRough = false;
       postMessage({ type: "transfers", transfers: viewer.transfers() });
     }
-    // At −3, what comes wakes this.
-    if (wait !== -3) schedule(Math.max(wait, 0));
+    // At −3, what comes wakes this, and at −4 the GPU.
+    if (wait > -3) schedule(Math.max(wait, 0));
   } catch (error) {
     complain(error);
   }
@@ -77,7 +103,7 @@ function showFrame() {
   const { buffer } = viewer.pixels();
   const camera = viewer.camera();
   postMessage(
-    { type: "frame", width, height, isExact: exact === 1, milliseconds, camera, buffer },
+    { type: "frame", width, height, isExact: exact === 1, milliseconds, camera, buffer, ...drawn },
     [buffer],
   );
 }
@@ -104,11 +130,34 @@ function sayFetched() {
   postMessage({ type: "fetched", ...ranges.sums, isBusy: ranges.isBusy });
 }
 
+/** Returns why the CPU engine draws before WebGPU was asked, or nothing. */
+function withoutGpu(wanted) {
+  if (wanted === "cpu") return "The page asks for the CPU engine.";
+  if (!isSecureContext) return "Browsers have WebGPU only for pages by https, of this machine or in files.";
+  return navigator.gpu ? "" : "This browser has no WebGPU.";
+}
+
+/** Finds what draws: WebGPU on a GPU, or what the page asks for. */
+async function engineFor(wanted) {
+  const onProcessor = (reason) => [Engine.cpu(), { engine: "cpu", reason }];
+  const reason = withoutGpu(wanted);
+  if (reason) return onProcessor(reason);
+  try {
+    webgpu ??= await Engine.webgpu();
+  } catch (error) {
+    return onProcessor(String(error?.message ?? error));
+  }
+  if (wanted !== "gpu" && webgpu.is_software()) {
+    return onProcessor("WebGPU runs on the processor here, where the CPU engine is faster.");
+  }
+  return [webgpu, { engine: "webgpu", reason: "" }];
+}
+
 /** Makes the viewer, and fetches what it needs to begin. */
-async function made(scene, held, size) {
+async function made(scene, held, engine, size) {
   for (;;) {
     try {
-      return new Viewer(scene, held, ...size);
+      return new Viewer(scene, held, engine, ...size);
     } catch (error) {
       const wanted = held.requests();
       if (wanted.length === 0 || error instanceof WebAssembly.RuntimeError) throw error;
@@ -125,7 +174,7 @@ async function made(scene, held, size) {
 }
 
 /** Opens a scene. Files are buffers, or addresses of files that come in parts. */
-async function open({ scene, files, width, height }) {
+async function open({ scene, files, engine, width, height }) {
   const mine = ++opening;
   ranges?.close();
   viewer?.free();
@@ -145,9 +194,11 @@ async function open({ scene, files, width, height }) {
     if (whole) held.add(name, new Uint8Array(whole));
     else held.arrive(held.add_parts(name, size), 0, bytes);
   }
-  const next = await made(scene, held, [width, height]);
+  const [device, means] = await engineFor(engine);
+  const next = await made(scene, held, device, [width, height]);
   if (mine !== opening) return next.free();
-  viewer = next;
+  [viewer, drawn] = [next, means];
+  hearEngine();
   fetching.hear = {
     arrive(file, start, bytes) {
       try {
@@ -167,6 +218,7 @@ async function open({ scene, files, width, height }) {
     summary: viewer.summary(),
     warnings: viewer.warnings(),
     transfers: viewer.transfers(),
+    ...drawn,
   });
   if (ranges) sayFetched();
   schedule();

@@ -3,12 +3,14 @@
 use crate::{MOST, Request, Stage, Step};
 use glam::{DVec2, DVec3};
 use splatkit::{
-    Error,
+    Device, Error,
+    gpu::{AdapterChoice, Budget, Gpu},
     input::Parts,
     session::{CameraEntry, ClipEntry, Side},
     volume::TransferFunction,
 };
 use wasm_bindgen::prelude::*;
+use wasm_bindgen_futures::future_to_promise;
 
 /// The files of a scene, by the names that the scene file gives them.
 #[wasm_bindgen]
@@ -44,6 +46,29 @@ impl Files {
     }
 }
 
+/// What draws.
+#[wasm_bindgen]
+pub struct Engine(Device);
+
+#[wasm_bindgen]
+impl Engine {
+    /// The CPU engine.
+    pub fn cpu() -> Self {
+        Self(Device::Cpu)
+    }
+
+    /// The GPU engine, on a device of WebGPU.
+    pub async fn webgpu() -> Result<Self, JsError> {
+        let gpu = Gpu::request(&AdapterChoice::Automatic).await.map_err(|error| told(&error))?;
+        Ok(Self(Device::Gpu(gpu, Budget::default())))
+    }
+
+    /// Whether WebGPU runs on the processor.
+    pub fn is_software(&self) -> bool {
+        matches!(&self.0, Device::Gpu(gpu, _) if gpu.is_software())
+    }
+}
+
 /// A scene that is shown.
 #[wasm_bindgen]
 pub struct Viewer(Stage);
@@ -52,8 +77,14 @@ pub struct Viewer(Stage);
 impl Viewer {
     /// Opens a scene, for a picture of this many pixels.
     #[wasm_bindgen(constructor)]
-    pub fn new(scene: &str, files: &Files, width: u32, height: u32) -> Result<Viewer, JsError> {
-        let stage = Stage::open(scene, files.0.clone(), [width, height]);
+    pub fn new(
+        scene: &str,
+        files: &Files,
+        engine: &Engine,
+        width: u32,
+        height: u32,
+    ) -> Result<Viewer, JsError> {
+        let stage = Stage::open(scene, files.0.clone(), [width, height], &engine.0);
         stage.map(Self).map_err(|error| told(&error))
     }
 
@@ -68,15 +99,36 @@ impl Viewer {
     }
 
     /// Does the next part of the work. Returns the milliseconds to wait before the next one; −1 if
-    /// nothing is left to do, −2 if there is a new frame, and −3 if parts have to come first.
+    /// nothing is left to do, −2 if there is a new frame, −3 if parts have to come first, and −4
+    /// if a GPU draws.
     pub fn step(&mut self) -> Result<f64, JsError> {
         Ok(match self.0.step().map_err(|error| told(&error))? {
             Step::Rests => -1.0,
             Step::Shows => -2.0,
             Step::Lacks => -3.0,
+            Step::Draws => -4.0,
             Step::Works => 0.0,
             Step::Waits(milliseconds) => milliseconds,
         })
+    }
+
+    /// A promise that is kept when the GPU has done something.
+    pub fn more(&self) -> js_sys::Promise {
+        let more = self.0.more();
+        future_to_promise(async move {
+            more.await;
+            Ok(JsValue::UNDEFINED)
+        })
+    }
+
+    /// See [`Stage::is_gpu`].
+    pub fn is_gpu(&self) -> bool {
+        self.0.is_gpu()
+    }
+
+    /// See [`Stage::refusal`].
+    pub fn refusal(&self) -> Option<String> {
+        self.0.refusal().map(str::to_owned)
     }
 
     /// What to fetch of files in parts, the most important first: for each range the number of the

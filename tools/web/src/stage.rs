@@ -1,16 +1,20 @@
 //! A scene that a page shows: drawn coarsely while it moves, and exactly once it rests.
 //!
 //! A page has one thread for this, which also hears the hand. So nothing here takes long, apart
-//! from opening the scene: fine frames are drawn in strips, and the hand is heard between them.
+//! from opening the scene: fine frames are drawn in strips, and the hand is heard between them. A
+//! GPU draws whole frames meanwhile. If it cannot, the processor draws.
+
+mod painter;
 
 use crate::{Files, Request};
 use glam::{DVec2, DVec3};
+use painter::Painter;
 use splatkit::{
-    Device, Error, Renderer, Result,
+    Device, Error, Result,
     interaction::{Effort, Orbit, Pace, Probe},
     math::{Camera, View},
     picture::Picture,
-    scene::Settings,
+    scene::{Scene, Settings},
     session::{CameraEntry, ClipEntry, Description, Drawing, Loaded, Side},
     volume::TransferFunction,
 };
@@ -46,6 +50,8 @@ pub enum Step {
     Works,
     /// There is a new frame. Call again.
     Shows,
+    /// A GPU draws. Call again when [`Stage::more`] is ready.
+    Draws,
     /// Parts of files have to come first ([`Stage::requests`]). Call again then.
     Lacks,
 }
@@ -66,8 +72,13 @@ pub struct Frame {
 /// A frame that is being drawn.
 struct Work {
     effort: Effort,
+    /// Whether the view moves. A frame of a moving view is finished, even if it has moved on.
+    moves: bool,
     settings: Settings,
+    drawing: Drawing,
+    camera: Camera,
     view: View,
+    start: Instant,
     picture: Picture,
     /// The rows that are drawn, and those of a strip.
     done: u32,
@@ -83,7 +94,10 @@ pub struct Stage {
     is_rough: bool,
     rough: Vec<Request>,
     loaded: Loaded,
-    renderer: Renderer,
+    painter: Painter,
+    device: Device,
+    /// Why a GPU that was given does not draw.
+    refusal: Option<String>,
     drawing: Drawing,
     orbit: Orbit,
     size: [u32; 2],
@@ -108,12 +122,12 @@ pub struct Stage {
 
 impl Stage {
     /// Reads a scene file, and the inputs that it names. The picture has `size` pixels instead of
-    /// what the scene file says.
+    /// what the scene file says. If a GPU refuses the scene, the processor draws.
     ///
     /// # Errors
     /// Those of [`Description::parse`], of [`Files::load`] and of preparing the scene. If one of
     /// the files lacks parts then, fetch those and try again.
-    pub fn open(text: &str, files: Files, size: [u32; 2]) -> Result<Self> {
+    pub fn open(text: &str, files: Files, size: [u32; 2], device: &Device) -> Result<Self> {
         let mut description = Description::parse(text)?;
         // A page shows one view, in pixels.
         let picture = &mut description.picture;
@@ -127,7 +141,7 @@ impl Stage {
         let camera = framing.camera(&loaded.subject, drawing.free(0))?;
         let up = framing.orientation(&loaded.subject).0.up;
         let orbit = Orbit::new(camera, up, loaded.subject.bounds.diagonal());
-        let renderer = Renderer::new(&Device::Cpu, &loaded.scene)?;
+        let (painter, refusal) = painter_on(device, &loaded.scene)?;
         let sheet = loaded.scene.finest_sheet();
         let (is_fitted, is_changed) = (description.camera.is_none(), true);
         let (is_rough, rough) = (files.lack(), files.requests());
@@ -138,7 +152,9 @@ impl Stage {
             is_rough,
             rough,
             loaded,
-            renderer,
+            device: if painter.is_gpu() { device.clone() } else { Device::Cpu },
+            painter,
+            refusal,
             drawing,
             orbit,
             is_fitted,
@@ -168,16 +184,50 @@ impl Stage {
         }
         (self.loaded, self.drawing) = read?;
         (self.is_rough, self.rough) = (self.files.lack(), rough);
-        self.renderer = Renderer::new(&Device::Cpu, &self.loaded.scene)?;
         self.sheet = self.loaded.scene.finest_sheet();
-        for (field, transfer) in std::mem::take(&mut self.transfers) {
-            self.set_transfer(field, &transfer)?;
-        }
+        self.prepare()?;
         if self.is_fitted {
             self.fit(None)?;
         }
         self.touch();
         Ok(())
+    }
+
+    /// Prepares the scene on the device, with the transfer functions that were set.
+    fn prepare(&mut self) -> Result<()> {
+        let (painter, refusal) = painter_on(&self.device, &self.loaded.scene)?;
+        if refusal.is_some() {
+            (self.device, self.refusal) = (Device::Cpu, refusal);
+        }
+        self.painter = painter;
+        for (field, transfer) in std::mem::take(&mut self.transfers) {
+            self.set_transfer(field, &transfer)?;
+        }
+        Ok(())
+    }
+
+    /// Lets the processor draw from now on.
+    fn fall_back(&mut self, error: &Error) -> Result<()> {
+        (self.device, self.refusal) = (Device::Cpu, Some(error.to_string()));
+        self.pace = Pace::new(MOVING);
+        self.prepare()?;
+        self.touch();
+        Ok(())
+    }
+
+    /// Whether a GPU draws.
+    pub fn is_gpu(&self) -> bool {
+        self.painter.is_gpu()
+    }
+
+    /// Returns why the GPU that was given does not draw, if it does not.
+    pub fn refusal(&self) -> Option<&str> {
+        self.refusal.as_deref()
+    }
+
+    /// Returns a future that is ready when the GPU has done something.
+    pub fn more(&self) -> impl Future<Output = ()> + use<> {
+        self.painter.more()
     }
 
     /// Hands in bytes of a file in parts.
@@ -280,13 +330,14 @@ impl Stage {
     ///
     /// # Errors
     /// [`Error::Argument`] if there is no such field, and those of
-    /// [`Renderer::set_transfer`].
+    /// [`Renderer::set_transfer`](splatkit::Renderer::set_transfer).
     pub fn set_transfer(&mut self, field: usize, transfer: &TransferFunction) -> Result<()> {
         let fields = self.loaded.scene.fields();
         let item = *fields.get(field).ok_or_else(|| {
             Error::Argument(format!("there is no field {field}: the scene has {}", fields.len()))
         })?;
-        self.renderer.set_transfer(item, transfer)?;
+        self.loaded.scene.with_transfer(item, transfer)?;
+        self.painter.set_transfer(item, transfer)?;
         self.transfers.insert(field, transfer.clone());
         self.touch();
         Ok(())
@@ -294,7 +345,9 @@ impl Stage {
 
     /// Returns the transfer functions of the fields.
     pub fn transfers(&self) -> Vec<TransferFunction> {
-        self.renderer.scene().items.iter().filter_map(|item| item.transfer().cloned()).collect()
+        let own = self.loaded.scene.items.iter().filter_map(|item| item.transfer());
+        let set = |(field, own)| self.transfers.get(&field).unwrap_or(own).clone();
+        own.enumerate().map(set).collect()
     }
 
     /// Something changed: the last frame no longer shows it.
@@ -406,7 +459,8 @@ impl Stage {
     /// Does the next part of the work, which is short.
     ///
     /// # Errors
-    /// Those of [`Renderer::render`]. Nothing more is drawn then, until something changes.
+    /// Those of [`Renderer::render`](splatkit::Renderer::render) on the processor. Nothing more is
+    /// drawn then, until something changes.
     pub fn step(&mut self) -> Result<Step> {
         let done = self.next();
         if done.is_err() {
@@ -416,6 +470,9 @@ impl Stage {
     }
 
     fn next(&mut self) -> Result<Step> {
+        if let Some(step) = self.hear_gpu()? {
+            return Ok(step);
+        }
         if self.is_rough && self.is_fed && self.rough.is_empty() && self.work.is_none() {
             self.read_again()?;
         }
@@ -455,30 +512,66 @@ impl Stage {
     fn begin(&mut self, effort: Effort, moves: bool) -> Result<()> {
         self.files.begin(&self.rough);
         self.is_fed = false;
-        let exact = &self.drawing.settings;
+        let (exact, camera) = (&self.drawing.settings, self.orbit.camera().clone());
         let settings = effort.settings(exact, exact.sheet_thickness.or(self.sheet));
-        let view = self.orbit.camera().view(settings.size)?;
+        let view = camera.view(settings.size)?;
         let picture = Picture::blank(settings.size);
         let height = settings.size[1];
-        let rows = if moves { height } else { strip_rows(height) };
-        self.work =
-            Some(Work { effort, settings, view, picture, done: 0, rows, milliseconds: 0.0 });
+        self.work = Some(Work {
+            effort,
+            moves,
+            settings,
+            drawing: self.drawing.clone(),
+            camera,
+            view,
+            start: Instant::now(),
+            picture,
+            done: 0,
+            rows: if moves { height } else { strip_rows(height) },
+            milliseconds: 0.0,
+        });
         Ok(())
     }
 
+    /// Looks at the frame that a GPU draws. Returns `None` if another one may begin.
+    fn hear_gpu(&mut self) -> Result<Option<Step>> {
+        if !self.painter.is_drawing() {
+            return Ok(None);
+        }
+        if self.is_changed && self.work.as_ref().is_some_and(|work| !work.moves) {
+            self.work = None;
+            self.painter.stop();
+        }
+        let Some(drawn) = self.painter.poll() else { return Ok(Some(Step::Draws)) };
+        match (drawn, self.work.take()) {
+            (Ok(picture), Some(work)) => {
+                let milliseconds = work.start.elapsed().as_secs_f64() * 1e3;
+                self.finish(Work { picture, milliseconds, ..work }).map(Some)
+            }
+            (Ok(_), None) | (Err(Error::Stopped), _) => Ok(None),
+            (Err(error), _) => self.fall_back(&error).map(|()| None),
+        }
+    }
+
     fn draw_strip(&mut self) -> Result<Step> {
+        if self.painter.is_gpu() {
+            if let Some(work) = &self.work {
+                self.painter.begin(work.view.clone(), work.settings.clone());
+            }
+            return Ok(self.hear_gpu()?.unwrap_or(Step::Works));
+        }
         let Some(mut work) = self.work.take() else { return Ok(Step::Rests) };
         let [width, height] = work.settings.size;
         let rows = work.rows.min(height - work.done);
         let start = Instant::now();
         if rows == height {
-            work.picture = self.renderer.render(&work.view, &work.settings)?.0;
+            work.picture = self.painter.draw(&work.view, &work.settings)?;
         } else {
             let above = DVec2::new(0.0, f64::from(work.done));
             let size = [width, rows];
             let view = View { center: work.view.center - above, size, ..work.view.clone() };
             let settings = Settings { size, ..work.settings.clone() };
-            let strip = self.renderer.render(&view, &settings)?.0;
+            let strip = self.painter.draw(&view, &settings)?;
             work.picture.paste(&strip, [0, work.done])?;
         }
         work.milliseconds += start.elapsed().as_secs_f64() * 1e3;
@@ -492,18 +585,27 @@ impl Stage {
 
     /// Makes a drawn picture the frame that is shown.
     fn finish(&mut self, work: Work) -> Result<Step> {
-        let Work { effort, picture, milliseconds, .. } = work;
+        let Work { effort, drawing, camera, picture, milliseconds, .. } = work;
         self.pace.took(effort, milliseconds);
-        let camera = self.orbit.camera().clone();
         let lacks = self.is_rough || self.files.lack();
         self.again = lacks.then(|| (effort, Instant::now()));
-        let is_exact = effort == Effort::EXACT && !lacks;
+        let is_exact = effort == Effort::EXACT && !lacks && !self.is_changed;
         let picture = match effort == Effort::EXACT {
-            true => self.drawing.reduced(picture, &self.loaded.items, &camera)?,
+            true => drawing.reduced(picture, &self.loaded.items, &camera)?,
             false => picture,
         };
         self.frame = Some(Frame { picture, camera, is_exact, milliseconds });
         Ok(Step::Shows)
+    }
+}
+
+/// Prepares a scene on a device, or on the processor if a GPU refuses. Returns what it says then.
+fn painter_on(device: &Device, scene: &Scene) -> Result<(Painter, Option<String>)> {
+    match Painter::new(device, scene) {
+        Err(error) if !matches!(device, Device::Cpu) => {
+            Ok((Painter::new(&Device::Cpu, scene)?, Some(error.to_string())))
+        }
+        done => Ok((done?, None)),
     }
 }
 

@@ -1,13 +1,21 @@
 //! A stage without a browser.
 
 use super::*;
-use splatkit::compare::compare_pictures;
+use splatkit::{
+    compare::compare_pictures,
+    gpu::{AdapterChoice, Budget, Gpu},
+    wgpu,
+};
 use std::path::PathBuf;
 
 const SIZE: [u32; 2] = [96, 72];
 
 /// A ball of points that fills most of the picture.
 fn stage() -> (Stage, Description, BTreeMap<PathBuf, Vec<u8>>) {
+    stage_on(&Device::Cpu)
+}
+
+fn stage_on(device: &Device) -> (Stage, Description, BTreeMap<PathBuf, Vec<u8>>) {
     let mut points = String::new();
     for number in 0..600 {
         let (turn, height) =
@@ -18,7 +26,7 @@ fn stage() -> (Stage, Description, BTreeMap<PathBuf, Vec<u8>>) {
     let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "ball.xyz"}], "picture":
         {"size": [9, 9], "views": ["front", "left"], "samples": 1, "background": "white"}}"#;
     let files = BTreeMap::from([("ball.xyz".into(), points.into_bytes())]);
-    let stage = Stage::open(text, held(&files), SIZE).expect("a scene");
+    let stage = Stage::open(text, held(&files), SIZE, device).expect("a scene");
     let mut scene = Description::parse(text).expect("a scene");
     scene.picture.views.clear();
     scene.picture.size = Some(SIZE);
@@ -33,6 +41,11 @@ fn held(files: &BTreeMap<PathBuf, Vec<u8>>) -> Files {
 
 /// Draws until nothing is left to do. Returns how often there was a new frame.
 fn rest(stage: &mut Stage) -> usize {
+    rest_on(stage, || panic!("the processor draws at once"))
+}
+
+/// The same for a GPU, which `wait` waits for.
+fn rest_on(stage: &mut Stage, wait: impl Fn()) -> usize {
     let mut frames = 0;
     loop {
         match stage.step().expect("a step") {
@@ -43,6 +56,7 @@ fn rest(stage: &mut Stage) -> usize {
                 std::thread::sleep(Duration::from_secs_f64(milliseconds / 1e3));
             }
             Step::Works => {}
+            Step::Draws => wait(),
             Step::Lacks => panic!("nothing comes in parts"),
         }
     }
@@ -104,6 +118,7 @@ fn what_cannot_be_is_an_error_and_changes_nothing() {
         r#"{"splatkit_scene": 2, "inputs": [{"file": "b.xyz"}]}"#,
         held(&BTreeMap::from([("a.xyz".into(), b"0 0 0\n".to_vec())])),
         SIZE,
+        &Device::Cpu,
     );
     let error = missing.err().expect("a file that is not there").to_string();
     assert!(error.contains("b.xyz: file: is not among the files in memory"), "{error}");
@@ -119,8 +134,80 @@ fn a_label_map_moves() {
     let mut labels = format!("{header}{segments}").into_bytes();
     labels.extend((0..512u32).map(|at| (at % 8 / 4 + 1) as u8));
     let files = BTreeMap::from([("a.seg.nrrd".into(), labels)]);
-    let mut stage = Stage::open(text, held(&files), SIZE).expect("a label map");
+    let mut stage = Stage::open(text, held(&files), SIZE, &Device::Cpu).expect("a label map");
     assert!(rest(&mut stage) >= 1);
     stage.turn(DVec2::new(9.0, 0.0));
     assert!(rest(&mut stage) >= 1 && stage.frame().is_some_and(|frame| frame.is_exact));
+}
+
+fn software() -> Gpu {
+    Gpu::headless(&AdapterChoice::Automatic).expect("an adapter")
+}
+
+fn wait_for(gpu: &Gpu) {
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).ok();
+}
+
+#[test]
+fn a_gpu_draws_the_picture_of_a_description() {
+    let gpu = software();
+    let device = Device::Gpu(gpu.clone(), Budget::default());
+    let (mut stage, scene, files) = stage_on(&device);
+    let wait = || wait_for(&gpu);
+    assert!(stage.is_gpu() && rest_on(&mut stage, wait) >= 2, "coarse before exact");
+    assert!(stage.frame().is_some_and(|frame| frame.is_exact));
+    let mut loaded = scene.load_held(&files, &|_| {}).expect("a scene");
+    let (picture, _) = loaded.draw(&scene, &device).expect("a picture");
+    let before = stage.frame().expect("a frame").picture.color.clone();
+    assert!(before == picture.color, "the same engine draws the same");
+    // A view that moves while the GPU draws: the exact frame of the old one is given up.
+    let camera = stage.camera();
+    stage.turn(DVec2::new(20.0, 5.0));
+    for _ in 0..200 {
+        if stage.step().expect("a step") == Step::Draws {
+            stage.turn(DVec2::new(1.0, 0.0));
+            wait();
+        }
+    }
+    stage.set_camera(&camera).expect("a camera");
+    rest_on(&mut stage, wait);
+    assert!(stage.frame().expect("a frame").picture.color == before);
+    assert!(stage.is_gpu() && stage.refusal().is_none());
+}
+
+#[test]
+fn the_processor_goes_on_after_a_gpu_that_is_lost() {
+    for while_drawing in [false, true] {
+        let gpu = software();
+        let (mut stage, ..) = stage_on(&Device::Gpu(gpu.clone(), Budget::default()));
+        let wait = || wait_for(&gpu);
+        if while_drawing {
+            assert_eq!(stage.step().expect("a step"), Step::Draws);
+        } else {
+            rest_on(&mut stage, wait);
+            stage.turn(DVec2::new(0.0, 0.0));
+        }
+        gpu.device.destroy();
+        rest_on(&mut stage, wait);
+        assert!(!stage.is_gpu() && stage.frame().is_some_and(|frame| frame.is_exact));
+        assert!(stage.refusal().is_some());
+        let (mut other, ..) = self::stage();
+        rest(&mut other);
+        assert!(stage.pixels() == other.pixels());
+    }
+}
+
+#[test]
+fn a_gpu_that_refuses_a_scene_leaves_it_to_the_processor() {
+    let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "a.nrrd"}],
+        "appearance": {"kernel": "linear"}}"#;
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n\n";
+    let mut samples = header.to_owned().into_bytes();
+    samples.extend((0..512u32).map(|at| (at % 8 * 30) as u8));
+    let files = BTreeMap::from([("a.nrrd".into(), samples)]);
+    let device = Device::Gpu(software(), Budget::default());
+    let mut stage = Stage::open(text, held(&files), SIZE, &device).expect("a volume");
+    assert!(!stage.is_gpu());
+    assert!(stage.refusal().is_some_and(|why| why.contains("linear")), "{:?}", stage.refusal());
+    assert!(rest(&mut stage) >= 1);
 }
