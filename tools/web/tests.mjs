@@ -50,15 +50,18 @@ const CASES = {
   mixed: ["demo/made.spz", "demo/knot.ply", "demo/specimen.nrrd", ...TRANSFER, "--azimuth", "-25", "--zoom", "1.5"],
 };
 
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox"],
-});
+const launched = (...args) =>
+  chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox", ...args] });
+const browser = await launched();
+/** Chromium with WebGPU on the processor: slow, and the same on all machines. */
+let withGpu = null;
+const SOFTWARE = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-unsafe-swiftshader"];
 
 /** Opens a page, and hears its events and its faults. */
-async function opened(address, options = {}) {
+async function opened(address, { isGpu = false, ...options } = {}) {
   const [width, height] = SIZE;
-  const context = await browser.newContext({ viewport: { width, height }, ...options });
+  if (isGpu) withGpu ??= await launched(...SOFTWARE);
+  const context = await (isGpu ? withGpu : browser).newContext({ viewport: { width, height }, ...options });
   const page = await context.newPage();
   page.faults = [];
   page.on("console", (message) => message.type() === "error" && page.faults.push(message.text()));
@@ -125,6 +128,179 @@ for (const [name, args] of Object.entries(CASES)) {
     return `${alike} dB, ${(bytes / 1e6).toFixed(1)} MB, first ${first} s, exact ${last} s`;
   };
 }
+
+/** Makes a page in one file draw by WebGPU, even on the processor. */
+function asksForGpu(from, to) {
+  const text = fs.readFileSync(at(from), "utf8");
+  fs.writeFileSync(at(to), text.replace("<splatkit-viewer ", '<splatkit-viewer engine="gpu" '));
+}
+
+/** Whether this machine has what `splatkit render` needs to draw by a GPU, or by its software. */
+const hasVulkan = spawnSync(splatkit, ["gpus"], { encoding: "utf8" }).stdout?.trim() !== "";
+
+/** Draws with the GPU engine, or with the CPU engine where there is no driver. */
+const renderedByGpu = (look, out) =>
+  run("render", ...look, "--size", SIZE.join("x"), "--engine", hasVulkan ? "gpu" : "cpu", "-o", out, "--overwrite");
+
+for (const [name, args] of Object.entries(CASES)) {
+  tests[`${name} by WebGPU`] = async () => {
+    const look = [...args, "--background", "#10141c"];
+    run("publish", ...look, "-o", `${name}.html`, "--overwrite", "--viewer", viewer);
+    asksForGpu(`${name}.html`, `${name}-webgpu.html`);
+    renderedByGpu(look, `${name}-gpu.png`);
+    const page = await opened(`file://${at(`${name}-webgpu.html`)}`, { isGpu: true });
+    const events = await rested(page);
+    const frames = ended(events);
+    assert.deepEqual(new Set(frames.map(({ engine }) => engine)), new Set(["webgpu"]), frames.at(-1).reason);
+    await saved(page, `${name}-webgpu.png`);
+    const alike = likeness(`${name}-webgpu.png`, `${name}-gpu.png`);
+    assert.deepEqual(page.faults, []);
+    assert.ok(alike >= (hasVulkan ? LEAST : 45), `the page shows another picture than render: ${alike} dB`);
+    const { camera, moving } = await turnedALittle(page);
+    // Back by a program: the same picture, byte for byte.
+    await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), camera);
+    ended(await rested(page));
+    await saved(page, `${name}-webgpu-back.png`);
+    assert.equal(likeness(`${name}-webgpu.png`, `${name}-webgpu-back.png`), Infinity);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    const [first, last] = [frames[0].at, frames.at(-1).at].map((time) => (time / 1000).toFixed(1));
+    return `${alike} dB, first ${first} s, exact ${last} s, drawn in ${Math.round(frames.at(-1).milliseconds)} ms, moving in ${moving} ms`;
+  };
+}
+
+/** Turns a scene by the mouse. Returns the camera before, and what a moving frame takes. */
+async function turnedALittle(page) {
+  const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
+  await page.mouse.move(320, 240);
+  await page.mouse.down();
+  for (let step = 1; step <= 20; step++) {
+    await page.mouse.move(320 + 6 * step, 240 + step);
+    await page.waitForTimeout(30);
+  }
+  await page.mouse.up();
+  const frames = ended(await rested(page));
+  const times = frames.filter(({ width }) => width < SIZE[0]).map(({ milliseconds }) => milliseconds);
+  times.sort((a, b) => a - b);
+  return { camera, moving: Math.round(times[times.length >> 1]) };
+}
+
+/** What makes a worker lose its device when the page asks for it. */
+const LOSES = `{
+  const request = GPUAdapter.prototype.requestDevice;
+  GPUAdapter.prototype.requestDevice = async function (...all) {
+    const device = await request.apply(this, all);
+    new BroadcastChannel("lose").onmessage = () => device.destroy();
+    return device;
+  };
+}
+`;
+
+/** Serves a scene whose page draws by WebGPU, with a worker that can lose its device. */
+async function losingServed(look) {
+  fs.rmSync(at("lost"), { recursive: true, force: true });
+  run("publish", ...look, "-o", "lost", "--viewer", viewer);
+  asksForGpu("lost/index.html", "lost/index.html");
+  const worker = at("lost/splatkit-worker.js");
+  fs.writeFileSync(worker, LOSES + fs.readFileSync(worker, "utf8"));
+  return served(at("lost"));
+}
+
+tests["a lost device"] = async () => {
+  const look = [...CASES.cloud, "--background", "#10141c"];
+  const server = await losingServed(look);
+  run("render", ...look, "--size", SIZE.join("x"), "--engine", "cpu", "-o", "lost-native.png", "--overwrite");
+  const said = [];
+  // At rest, and while it draws.
+  for (const wait of [500, 0]) {
+    const page = await opened(server.address, { isGpu: true });
+    assert.equal(ended(await rested(page)).at(-1).engine, "webgpu");
+    await page.evaluate(async (wait) => {
+      const one = document.querySelector("splatkit-viewer");
+      const { camera } = one;
+      const lose = () => new BroadcastChannel("lose").postMessage(0);
+      const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
+      if (wait) lose();
+      await pause(wait);
+      one.camera = camera;
+      await pause(40);
+      if (!wait) lose();
+    }, wait);
+    await page.waitForFunction(() => heard.some(({ name }) => name === "error"), null, { timeout: PATIENCE });
+    await page.waitForFunction(() => heard.some(({ name }) => name === "rest"), null, { timeout: PATIENCE });
+    const events = await page.evaluate(() => heard.splice(0));
+    const problem = events.find(({ name }) => name === "error");
+    assert.match(problem.message, /^The processor draws from now on, because WebGPU failed: .*(was lost|did not return)/);
+    assert.equal(problem.isFatal, false);
+    const last = events.filter(({ name }) => name === "frame").at(-1);
+    assert.deepEqual([last.engine, last.isExact], ["cpu", true]);
+    await saved(page, `lost-page-${wait}.png`);
+    const alike = likeness(`lost-page-${wait}.png`, "lost-native.png");
+    assert.ok(alike >= LEAST, `${alike} dB`);
+    await page.screenshot({ path: at(`lost-screen-${wait}.png`) });
+    said.push(`${alike} dB`);
+    await page.context().close();
+  }
+  server.close();
+  return said.join(", ");
+};
+
+/** The shaders that `cargo test` wrote, given to the browser's compiler. */
+if (process.env.SPLATKIT_SHADERS) {
+  tests.shaders = async () => {
+    const folder = process.env.SPLATKIT_SHADERS;
+    const names = fs.readdirSync(folder).filter((name) => name.endsWith(".wgsl"));
+    const server = await served(folder);
+    fs.writeFileSync(path.join(folder, "index.html"), "<!doctype html>");
+    const page = await opened(server.address, { isGpu: true });
+    const problems = await page.evaluate(async (names) => {
+      const adapter = await navigator.gpu.requestAdapter();
+      const device = await adapter.requestDevice({ requiredLimits: { maxStorageBuffersPerShaderStage: 9 } });
+      const problems = [];
+      for (const name of names) {
+        const code = await (await fetch(name)).text();
+        const module = device.createShaderModule({ code });
+        const { messages } = await module.getCompilationInfo();
+        problems.push(...messages.map(({ type, message, lineNum }) => `${name}:${lineNum}: ${type}: ${message}`));
+        const entryPoint = code.split("\n")[0].slice(3);
+        if (messages.length > 0 || !code.includes(`@compute`)) continue;
+        try {
+          await device.createComputePipelineAsync({ layout: "auto", compute: { module, entryPoint } });
+        } catch (error) {
+          problems.push(`${name}: ${error.message}`);
+        }
+      }
+      return problems;
+    }, names);
+    await page.context().close();
+    server.close();
+    assert.deepEqual(problems, []);
+    return `${names.length} compile`;
+  };
+}
+
+tests["what WebGPU does not draw"] = async () => {
+  const look = ["demo/specimen.nrrd", ...TRANSFER, "--kernel", "linear", "--background", "#10141c"];
+  run("publish", ...look, "-o", "refused.html", "--overwrite", "--viewer", viewer);
+  run("render", ...look, "--size", SIZE.join("x"), "--engine", "cpu", "-o", "refused-native.png", "--overwrite");
+  asksForGpu("refused.html", "refused-webgpu.html");
+  const engines = [];
+  // Refused by the engine, not asked for on the processor, and not there.
+  const pages = [["refused-webgpu", true, /linear/], ["refused", true, /runs on the processor/], ["refused-webgpu", false, /no WebGPU/]];
+  for (const [name, isGpu, reason] of pages) {
+    const page = await opened(`file://${at(`${name}.html`)}`, { isGpu });
+    await page.waitForFunction(() => heard.some(({ name }) => name === "rest"), null, { timeout: PATIENCE });
+    const frame = (await page.evaluate(() => heard.splice(0))).filter(({ name }) => name === "frame").at(-1);
+    assert.deepEqual([frame.engine, frame.isExact], ["cpu", true]);
+    assert.match(frame.reason, reason);
+    engines.push(frame.reason);
+    await saved(page, "refused-page.png");
+    const alike = likeness("refused-page.png", "refused-native.png");
+    assert.ok(alike >= LEAST, `${alike} dB`);
+    await page.context().close();
+  }
+  return engines.join(" | ");
+};
 
 tests["a hand"] = async () => {
   if (!fs.existsSync(at("mixed.html"))) await tests.mixed();
@@ -525,4 +701,5 @@ for (const [name, test] of Object.entries(tests)) {
   }
 }
 await browser.close();
+await withGpu?.close();
 process.exit(failed ? 1 : 0);
