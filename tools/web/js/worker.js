@@ -132,6 +132,7 @@ function sayFetched() {
 
 /** Returns why the CPU engine draws before WebGPU was asked, or nothing. */
 function withoutGpu(wanted) {
+  if (ranges) return "WebGPU does not draw files in parts yet.";
   if (wanted === "cpu") return "The page asks for the CPU engine.";
   if (!isSecureContext) return "Browsers have WebGPU only for pages by https, of this machine or in files.";
   return navigator.gpu ? "" : "This browser has no WebGPU.";
@@ -194,8 +195,13 @@ async function open({ scene, files, engine, width, height }) {
     if (whole) held.add(name, new Uint8Array(whole));
     else held.arrive(held.add_parts(name, size), 0, bytes);
   }
-  const [device, means] = await engineFor(engine);
-  const next = await made(scene, held, device, [width, height]);
+  let [device, means] = await engineFor(engine);
+  let next = await made(scene, held, device, [width, height]);
+  if (means.engine === "webgpu" && next.summary().includes("(bricks)")) {
+    next.free();
+    means = { engine: "cpu", reason: "WebGPU does not draw volumes in bricks yet." };
+    next = await made(scene, held, Engine.cpu(), [width, height]);
+  }
   if (mine !== opening) return next.free();
   [viewer, drawn] = [next, means];
   hearEngine();
