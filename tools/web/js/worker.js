@@ -59,11 +59,16 @@ function listen() {
   });
 }
 
+/** Goes on without WebGPU. The next scene asks for it again. */
+function goOn() {
+  webgpu = null;
+  drawn = { engine: "cpu", reason: viewer.refusal() };
+}
+
 /** Hears whether WebGPU still draws. If it gave up, the page is told why. */
 function hearEngine() {
   if (drawn.engine === "cpu" || viewer.is_gpu()) return;
-  webgpu = null;
-  drawn = { engine: "cpu", reason: viewer.refusal() };
+  goOn();
   hint(`The processor draws from now on, because WebGPU failed: ${drawn.reason}`);
 }
 
@@ -195,16 +200,11 @@ async function open({ scene, files, engine, width, height }) {
     if (whole) held.add(name, new Uint8Array(whole));
     else held.arrive(held.add_parts(name, size), 0, bytes);
   }
-  let [device, means] = await engineFor(engine);
-  let next = await made(scene, held, device, [width, height]);
-  if (means.engine === "webgpu" && next.summary().includes("(bricks)")) {
-    next.free();
-    means = { engine: "cpu", reason: "WebGPU does not draw volumes in bricks yet." };
-    next = await made(scene, held, Engine.cpu(), [width, height]);
-  }
+  const [device, means] = await engineFor(engine);
+  const next = await made(scene, held, device, [width, height]);
   if (mine !== opening) return next.free();
   [viewer, drawn] = [next, means];
-  hearEngine();
+  if (drawn.engine === "webgpu" && !viewer.is_gpu()) goOn();
   fetching.hear = {
     arrive(file, start, bytes) {
       try {
