@@ -208,8 +208,8 @@ impl Leveled {
         }
     }
 
-    /// Returns for each sample of a box, along each axis, the first and the last sample of the image
-    /// behind it; and the box of the image that has all of them.
+    /// Returns for each sample of a box, along each axis, the first and the last sample of the
+    /// image behind it; and the box of the image that has all of them.
     fn spans(
         &self,
         (level, ratio): (usize, [f64; 3]),

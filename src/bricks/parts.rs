@@ -71,7 +71,8 @@ impl Bricks {
     /// the finest level up to this one that is there as a whole.
     ///
     /// # Errors
-    /// Those of [`volume`](Self::volume); [`Error::Absent`] if not even the coarsest level is there.
+    /// Those of [`volume`](Self::volume); [`Error::Absent`] if not even the coarsest level is
+    /// there.
     pub(crate) fn volume_there(&self, level: usize) -> Result<Volume> {
         if !self.is_in_parts() {
             return self.volume(level);

@@ -11,7 +11,8 @@
 //! | `region` | the shapes of `crop` |
 //! | `motion` | moves, turns, scales and matrices |
 //! | `reproject` | other coordinate reference systems |
-//! | `thin`, `coarser`, `merge`, `reduce` | fewer points, vertices, splats and Gaussians that look the same |
+//! | `thin`, `coarser` | fewer points and vertices |
+//! | `merge`, `reduce` | fewer splats and Gaussians that look the same |
 //! | `clusters` | floaters, and the largest parts |
 //! | `surface`, `records`, `gaussians`, `splats` | the scenes that are edited |
 //! | `stream` | points larger than memory |

@@ -1,7 +1,7 @@
 //! SOG of PlayCanvas: trained 3D Gaussians as pictures whose bytes are positions in ranges or
 //! entries of codebooks. A scene is a folder with `meta.json` and WebP planes, or both in one ZIP
-//! file, `.sog`. Versions 1 and 2 of `meta.json` are read, and version 2 is written. Streamed scenes,
-//! in levels and chunks, have an index, `lod-meta.json`.
+//! file, `.sog`. Versions 1 and 2 of `meta.json` are read, and version 2 is written. Streamed
+//! scenes, in levels and chunks, have an index, `lod-meta.json`.
 //!
 //! Pixel i of each plane, in rows from the top left, belongs to Gaussian i. The frame is that of
 //! the trainer's PLY: tools turn nothing when they convert between both.

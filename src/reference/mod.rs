@@ -231,11 +231,11 @@
 //! S·key·diffuse·(n·l)'. The highlight is that of the eye times e·head, plus S·key times that of
 //! the half vector of l and −b̂.
 //!
-//! e = v + 2c·w·n, at least 0, is the light from all sides: the cosine's integral over the sphere to
-//! the first order in n. It is at most what comes to n in the open, 1 + 2c·w₀·n. v is the mean of T·L
-//! over all directions d, and w the mean of T·L·d, which is w₀ in the open. T is the light that comes
-//! in from d, and L the brightness there, 1 or 1 + d·up. S is what reaches the place of the lamp's
-//! light.
+//! e = v + 2c·w·n, at least 0, is the light from all sides: the cosine's integral over the sphere
+//! to the first order in n. It is at most what comes to n in the open, 1 + 2c·w₀·n. v is the mean
+//! of T·L over all directions d, and w the mean of T·L·d, which is w₀ in the open. T is the light
+//! that comes in from d, and L the brightness there, 1 or 1 + d·up. S is what reaches the place of
+//! the lamp's light.
 //!
 //! These are taken at a place before the surface: 2.5 times the step of their lattice along
 //! c·n − (1 − c)·b̂. The surface is a facet at its own distance, the radiance of a sheet in its

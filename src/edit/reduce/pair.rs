@@ -94,9 +94,9 @@ impl Shape {
     }
 }
 
-/// Returns two Gaussians as one of their mean and covariance, weighted by what they cover. It covers
-/// as much as both, even if one hides a part of the other: many overlap, and fewer must not let
-/// more light through.
+/// Returns two Gaussians as one of their mean and covariance, weighted by what they cover. It
+/// covers as much as both, even if one hides a part of the other: many overlap, and fewer must not
+/// let more light through.
 pub fn merge(a: &Shape, b: &Shape, colors: &Products) -> Merged {
     let (of_a, of_b) = (a.opacity * a.area(), b.opacity * b.area());
     let all = of_a + of_b;

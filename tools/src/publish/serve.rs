@@ -1,6 +1,6 @@
 //! `splatkit serve`: shows a scene in a browser, from a server on this machine. The page is that of
-//! `splatkit publish`. Hierarchies and bricks are read from the disk, part by part, as the page asks
-//! for them; so is a folder that was published. The rest stays in memory.
+//! `splatkit publish`. Hierarchies and bricks are read from the disk, part by part, as the page
+//! asks for them; so is a folder that was published. The rest stays in memory.
 
 use super::{PageFlags, answer::Answer, check_flags, content::Content, viewer::Viewer};
 use crate::{failure::Failure, given::Given, output, progress::Progress, render::Render};

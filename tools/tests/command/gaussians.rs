@@ -148,7 +148,22 @@ fn a_folder_of_planes_is_written() {
     folder.run("convert scene.ply -o made.sog").ok();
     let [beside, whole] = ["made/meta.json", "made.sog"].map(|name| load(&folder, name));
     assert_eq!((beside.centers, beside.harmonics), (whole.centers, whole.harmonics));
-    folder.run("convert scene.ply -o made/scene.json").fails(2, &["and the meta.json of SOG"]);
+    folder.run("convert scene.ply -o made/scene.json").fails(2, &["lod-meta.json of SOG"]);
+}
+
+#[test]
+fn a_streamed_scene_is_written_in_folders() {
+    let folder = Folder::new();
+    write(&scene(1), "ply", &folder.path("scene.ply"));
+    std::fs::create_dir(folder.path("made")).unwrap();
+    let said = folder.json("convert scene.ply -o made/lod-meta.json --json");
+    let size = |name: &str| std::fs::metadata(folder.path(name)).unwrap().len();
+    let level = std::fs::read_dir(folder.path("made/0_0")).unwrap();
+    let files = level.map(|file| file.unwrap().metadata().unwrap().len()).sum::<u64>();
+    assert_eq!(said["bytes"], size("made/lod-meta.json") + files);
+    assert_eq!(load(&folder, "made/lod-meta.json").len(), scene(1).len());
+    let text = ["made/lod-meta.json", "exists already"];
+    folder.run("convert scene.ply -o made/lod-meta.json").fails(1, &text);
 }
 
 #[test]

@@ -98,9 +98,9 @@ impl Viewer {
         self.0.summary()
     }
 
-    /// Does the next part of the work. Returns the milliseconds to wait before the next one; −1 if
-    /// nothing is left to do, −2 if there is a new frame, −3 if parts have to come first, and −4
-    /// if a GPU draws.
+    /// Does the next part of the work. Returns the milliseconds to wait before the next one.
+    /// −1: nothing is left to do. −2: there is a new frame. −3: parts have to come first. −4: a GPU
+    /// draws.
     pub fn step(&mut self) -> Result<f64, JsError> {
         Ok(match self.0.step().map_err(|error| told(&error))? {
             Step::Rests => -1.0,
