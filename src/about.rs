@@ -26,7 +26,8 @@ pub struct About {
     pub holes: u64,
     /// The labels, if the values are labels: names of things, not quantities.
     pub labels: Option<Labels>,
-    /// The channels of the file, if it has several of the same place, as files of microscopes do.
+    /// The channels of the file, if it has several of the same place, as files of microscopes do;
+    /// or its only one, if that has a colour.
     pub channels: Vec<Channel>,
     /// The number of the channel that the values are of, from 0.
     pub channel: usize,
@@ -56,6 +57,15 @@ pub struct Channel {
 impl Channel {
     /// Most channels in one picture.
     pub const MOST: usize = 8;
+
+    /// Returns whether the channels of a file are shown in their colours: if there are several, or
+    /// if the file gives its only one a colour. Programs write white if nobody chose one.
+    pub(crate) fn have_colors(channels: &[Self]) -> bool {
+        match channels {
+            [one] => one.color.is_some_and(|color| color != [1.0; 3]),
+            more => !more.is_empty(),
+        }
+    }
 
     /// Returns the name of the channel of this number among all, or “channel 2”.
     pub fn name_of(all: &[Self], number: usize) -> String {

@@ -123,9 +123,9 @@ impl Channels {
         }
     }
 
-    /// Says which channel the values are of, if there are several.
+    /// Says which channel the values are of, if there are several or if it has a colour.
     fn name(&self, about: &mut About, channel: usize) {
-        if self.all.len() > 1 {
+        if Channel::have_colors(&self.all) {
             about.name = Channel::name_of(&self.all, channel);
             about.window = self.all[channel].window;
             // Nothing else takes a volume several times over.

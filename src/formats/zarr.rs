@@ -200,7 +200,7 @@ fn name(about: &mut About, image: &Image, channel: usize) {
     about.length.clone_from(&image.unit);
     about.modality = image.is_ome.then_some(Modality::Microscopy);
     about.window = image.channels[channel].window;
-    if image.channels.len() > 1 {
+    if image.labels.is_none() && Channel::have_colors(&image.channels) {
         about.name = Channel::name_of(&image.channels, channel);
         (about.channels, about.channel) = (image.channels.clone(), channel);
     }

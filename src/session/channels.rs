@@ -44,7 +44,7 @@ impl Appearance {
     /// Returns whether the channels of a volume are shown in their colours: unless something else
     /// colours its values.
     pub(super) fn shows_channels(&self, about: &About) -> bool {
-        about.channels.len() > 1 && self.transfer.is_none() && self.coloring.map.is_none()
+        !about.channels.is_empty() && self.transfer.is_none() && self.coloring.map.is_none()
     }
 
     /// Returns the transfer function of a channel: that of its values, in its colour, which is
@@ -206,5 +206,21 @@ mod tests {
         let mixed = of(&[None, Some([0.0, 0.9, 1.0]), None]);
         assert_eq!(mixed[1], [0.0, 0.9, 1.0]);
         assert!(distance(&mixed[0], &mixed[1]) > 0.5 && distance(&mixed[0], &mixed[2]) > 0.1);
+    }
+
+    #[test]
+    fn a_single_channel_is_shown_in_its_colour() {
+        let red = Some([1.0, 0.0, 0.0]);
+        for (colors, has) in [
+            (&[][..], false),
+            (&[None], false),
+            (&[Some([1.0; 3])], false),
+            (&[red], true),
+            (&[None, None], true),
+        ] {
+            assert_eq!(Channel::have_colors(&about(colors, 0).channels), has, "{colors:?}");
+        }
+        assert!(Appearance::default().shows_channels(&about(&[red], 0)));
+        assert!(!Appearance::default().shows_channels(&About::default()));
     }
 }

@@ -321,6 +321,25 @@ fn images_have_levels_channels_and_times() {
 }
 
 #[test]
+fn an_only_channel_has_the_colour_of_its_metadata() {
+    for (color, has) in [("FF8000", true), ("FFFFFF", false)] {
+        let folder = Folder::new();
+        let attributes = json!({
+            "multiscales": [{"datasets": [{"path": "0"}]}],
+            "omero": {"channels": [{"label": "EB3", "color": color}]},
+        });
+        put_group(&folder, "a.zarr", 2, &attributes);
+        put_json(&folder, "a.zarr/0/.zarray", &zarray(&[2, 2, 2], &[2, 2, 2], "|u1", json!({})));
+        put(&folder, "a.zarr/0/0.0.0", [0, 1, 2, 3, 4, 5, 6, 7]);
+        let about = load(&folder, "a.zarr", &all_channels()).unwrap().about;
+        assert_eq!(
+            (about.channels.len(), about.name.as_str()),
+            if has { (1, "EB3") } else { (0, "") }
+        );
+    }
+}
+
+#[test]
 fn plates_series_and_labels_lead_to_images() {
     for version in [2, 3] {
         let folder = Folder::new();

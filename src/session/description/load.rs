@@ -348,7 +348,7 @@ impl Loaded {
             Item::Bricks(bricks, ..) => bricks.about(),
             _ => return None,
         };
-        (about.channels.len() > 1).then_some(about)
+        (!about.channels.is_empty()).then_some(about)
     }
 
     /// Finds the points that span what is seen with these settings, if the camera is fitted to

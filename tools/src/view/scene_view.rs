@@ -108,7 +108,7 @@ impl SceneView {
     /// several.
     fn channel_of(&self, item: usize) -> Option<(usize, &str)> {
         match self.stage.loaded.scene.items.get(item)? {
-            Item::Volume(volume, ..) if volume.about.channels.len() > 1 => {
+            Item::Volume(volume, ..) if !volume.about.channels.is_empty() => {
                 Some((volume.about.channel, &volume.about.name))
             }
             _ => None,
