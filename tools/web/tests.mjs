@@ -419,7 +419,7 @@ tests["a folder"] = async () => {
 
 const look = ["--background", "#10141c"];
 /** Points of the cloud, and samples of the volume along each axis, that are read in ranges. */
-const POINTS = Number(process.env.POINTS ?? 600_000);
+const POINTS = Number(process.env.POINTS ?? 3_000_000);
 const SIDE = Number(process.env.SAMPLES ?? 224);
 
 /** Makes a cloud and a volume that are large enough to be read in parts. */
