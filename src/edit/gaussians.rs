@@ -6,12 +6,11 @@ use crate::{
     gaussians::{
         Gaussians,
         harmonics::{CONSTANT, terms},
-        turn,
+        shape_of, turn,
     },
-    math::eigen,
     parallel::prelude::*,
 };
-use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 
 /// The names of the values of a Gaussian.
 const NAMES: [&str; 8] =
@@ -68,7 +67,10 @@ impl Editable for Gaussians {
             _ => {
                 let shapes: Vec<(Vec3, Quat)> = (0..self.len())
                     .into_par_iter()
-                    .map(|index| shape(linear * self.axes(index).as_dmat3()))
+                    .map(|index| {
+                        let axes = linear * self.axes(index).as_dmat3();
+                        shape_of(axes * axes.transpose())
+                    })
                     .collect();
                 (self.scales, self.rotations) = shapes.into_iter().unzip();
             }
@@ -85,12 +87,4 @@ impl Editable for Gaussians {
     fn thin(&mut self, thin: &Thin) -> Result<()> {
         reduce::thin(self, thin)
     }
-}
-
-/// Returns the deviations and the turn of a covariance M·Mᵀ.
-fn shape(axes: DMat3) -> (Vec3, Quat) {
-    let (squares, [first, second, _]) = eigen(axes * axes.transpose());
-    let turn = DQuat::from_mat3(&DMat3::from_cols(first, second, first.cross(second)));
-    let scales = squares.map(|square| square.max(0.0).sqrt() as f32);
-    (Vec3::from(scales), turn.normalize().as_quat())
 }

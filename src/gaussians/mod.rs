@@ -18,8 +18,13 @@ pub use phantom::phantom;
 pub use seen::{EXTENT, Eye};
 pub use survey::Survey;
 
-use crate::{Error, Result, about::About, math::Bounds, parallel::prelude::*};
-use glam::{DVec3, Mat3, Quat, Vec3};
+use crate::{
+    Error, Result,
+    about::About,
+    math::{Bounds, eigen},
+    parallel::prelude::*,
+};
+use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 use std::ops::Range;
 
 /// The highest degree of the spherical harmonics.
@@ -65,6 +70,14 @@ impl Broken {
     pub fn all(self) -> u64 {
         self.not_finite + self.without_rotation
     }
+}
+
+/// Returns the deviations and the turn of a Gaussian of this covariance, the longest axis first.
+pub(crate) fn shape_of(covariance: DMat3) -> (Vec3, Quat) {
+    let (squares, [first, second, _]) = eigen(covariance);
+    let turn = DQuat::from_mat3(&DMat3::from_cols(first, second, first.cross(second)));
+    let scales = squares.map(|square| square.max(0.0).sqrt() as f32);
+    (Vec3::from(scales), turn.normalize().as_quat())
 }
 
 impl Gaussians {

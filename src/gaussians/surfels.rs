@@ -1,14 +1,12 @@
 //! Surfels as Gaussians, for viewers that draw trained scenes.
 
-use super::{Gaussians, harmonics::constant_of};
+use super::{Gaussians, harmonics::constant_of, shape_of};
 use crate::{
-    Result,
-    math::eigen,
-    memory,
+    Result, memory,
     parallel::prelude::*,
     splat::{Splat, Surfels},
 };
-use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
+use glam::{DMat3, DVec3, Quat, Vec3};
 
 impl Gaussians {
     /// Returns surfels as Gaussians that cover as much along a ray through their centres. Their
@@ -39,10 +37,7 @@ impl Gaussians {
 /// Returns the deviations and the axes of a splat.
 fn shape(splat: &Splat) -> (Vec3, Quat) {
     let b = factor(splat);
-    let (squares, [first, second, _]) = eigen(b * b.transpose());
-    let turn = DQuat::from_mat3(&DMat3::from_cols(first, second, first.cross(second)));
-    let scale = squares.map(|square| square.max(0.0).sqrt() as f32);
-    (Vec3::from(scale), turn.normalize().as_quat())
+    shape_of(b * b.transpose())
 }
 
 /// Returns the factor B of the covariance.

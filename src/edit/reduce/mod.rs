@@ -16,12 +16,13 @@ use crate::{
     gaussians::{
         Gaussians,
         harmonics::{CONSTANT, terms},
+        shape_of,
     },
     math::{eigen, neighbours::Neighbours},
     memory,
     parallel::prelude::*,
 };
-use glam::{DMat3, DQuat, Quat, Vec3};
+use glam::Vec3;
 use pair::{Merged, Products, Shape};
 use std::{cmp::Ordering, collections::BinaryHeap};
 
@@ -238,21 +239,13 @@ impl Reduction {
         for (at, &index) in kept.iter().enumerate() {
             if self.counts[index as usize] > 1 {
                 let Shape { center, covariance, opacity } = self.shapes[index as usize];
-                (set.scales[at], set.rotations[at]) = axes(covariance);
+                (set.scales[at], set.rotations[at]) = shape_of(covariance);
                 set.centers[at] = center.as_vec3();
                 set.opacities[at] = opacity as f32;
             }
         }
         set
     }
-}
-
-/// Returns the deviations and the turn of a covariance.
-fn axes(covariance: DMat3) -> (Vec3, Quat) {
-    let (squares, [first, second, _]) = eigen(covariance);
-    let turn = DQuat::from_mat3(&DMat3::from_cols(first, second, first.cross(second)));
-    let scales = squares.map(|square| square.max(0.0).sqrt() as f32);
-    (Vec3::from(scales), turn.normalize().as_quat())
 }
 
 /// Returns the nearest neighbours of each place. Those at one place are neighbours in a row.
