@@ -44,9 +44,71 @@ pub struct Abandoned {
 pub fn abandon() -> Abandoned {
     let mut held = live();
     for path in std::mem::take(&mut *held).into_values() {
-        std::fs::remove_file(path).ok();
+        remove(&path);
     }
     Abandoned { _held: held }
+}
+
+/// Removes a file, or a folder with all in it.
+fn remove(path: &Path) {
+    if std::fs::remove_file(path).is_err() {
+        std::fs::remove_dir_all(path).ok();
+    }
+}
+
+/// Returns a number that no other entry of the list has.
+fn next_number() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// A folder for files that go with it: when it is dropped, and when the process is interrupted
+/// ([`abandon`]). Nobody else can read it.
+#[derive(Debug)]
+pub struct TemporaryFolder {
+    number: u64,
+    path: PathBuf,
+}
+
+impl TemporaryFolder {
+    /// Makes a folder among the system's temporary files.
+    ///
+    /// # Errors
+    /// [`Error::Output`](crate::Error::Output), such as on a full disk.
+    pub fn new() -> crate::Result<Self> {
+        let place = std::env::temp_dir();
+        let mut live = live();
+        let mut builder = std::fs::DirBuilder::new();
+        #[cfg(unix)]
+        std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+        let (number, process) = (next_number(), std::process::id());
+        for try_number in 0..MOST {
+            let path = place.join(format!("splatkit-{process}-{number}-{try_number}"));
+            match builder.create(&path) {
+                Ok(()) => {
+                    live.insert(number, path.clone());
+                    return Ok(Self { number, path });
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(crate::Error::output(&place, error)),
+            }
+        }
+        let error = io::Error::new(io::ErrorKind::AlreadyExists, "no name is free");
+        Err(crate::Error::output(&place, error))
+    }
+
+    /// Returns where the folder is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        if live().remove(&self.number).is_some() {
+            std::fs::remove_dir_all(&self.path).ok();
+        }
+    }
 }
 
 /// A temporary file, locked while its process lives. An unlocked one was left behind by a process
@@ -88,8 +150,7 @@ impl Part {
                         // created its own file under this name.
                         continue;
                     }
-                    static NEXT: AtomicU64 = AtomicU64::new(0);
-                    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+                    let number = next_number();
                     live.insert(number, path.clone());
                     let part = Self { number, path, file };
                     drop(live);

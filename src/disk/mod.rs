@@ -18,7 +18,7 @@ mod step;
 mod tests;
 
 pub use atomic::{AtomicFile, write, write_with};
-pub use live::{Abandoned, abandon};
+pub use live::{Abandoned, TemporaryFolder, abandon};
 #[cfg(feature = "sog")]
 pub(crate) use new::is_replaceable;
 pub use new::{may_replace, rename};

@@ -39,7 +39,7 @@ pub(crate) use points::PointFile;
 use rows::Rows;
 pub use samples::{arrays, has_faces, read_samples};
 use table::Table;
-pub use write::write;
+pub use write::{RADIUS, value_name, write};
 
 /// Rows per parallel task.
 const CHUNK: usize = 1 << 14;

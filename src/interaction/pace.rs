@@ -7,6 +7,8 @@ use crate::{hierarchy::Detail, scene::Settings};
 const WIDEST: f64 = 8.0;
 /// Largest factor on the width of splats and the thickness of sheets.
 const COARSEST: f64 = 4.0;
+/// The most times that a frame is asked to be faster than the exact picture.
+const FASTEST: f64 = WIDEST * WIDEST * COARSEST;
 /// A frame within these shares of the wanted time changes nothing.
 const STEADY: [f64; 2] = [0.7, 1.0];
 /// Largest change of the effort from one moving frame to the next.
@@ -18,6 +20,10 @@ const TOO_SLOW: f64 = 1.5;
 /// have ten times the splats of the next coarser one, and trying it all the time would stutter.
 const COARSER: f64 = 1.25;
 const FORGOTTEN: f64 = 0.995;
+/// Wide pixels must pay: a moving frame with pixels of width `w` must be `w` to this power times
+/// faster than the exact one. Many small splats take their time at every width, and would be
+/// shown as blocks for nothing.
+const PAYS: f64 = 0.6;
 /// Ratio of the pixel widths of two steps of a resting view.
 const FINER: f64 = 2.0;
 
@@ -78,6 +84,10 @@ pub struct Pace {
     factor: f64,
     /// The least factor for now, because a smaller one was too slow.
     least: f64,
+    /// The largest factor for now, because a larger one did not pay.
+    most: f64,
+    /// The time of the last exact picture, in milliseconds.
+    exact: Option<f64>,
     /// The effort of the last frame of the current view.
     last: Option<Effort>,
 }
@@ -86,7 +96,8 @@ impl Pace {
     /// A pace that keeps moving frames within a time in milliseconds.
     pub fn new(wanted: f64) -> Self {
         // The first frame is coarse. If it was faster than wanted, the next ones are finer.
-        Self { wanted: wanted.max(1.0), factor: 16.0, least: 1.0, last: None }
+        let wanted = wanted.max(1.0);
+        Self { wanted, factor: 16.0, least: 1.0, most: FASTEST, exact: None, last: None }
     }
 
     /// Something changed: the last frame no longer shows the current view.
@@ -122,11 +133,24 @@ impl Pace {
             if !(STEADY[0]..=STEADY[1]).contains(&share) {
                 // A little below the wanted time.
                 let change = (share / 0.85).clamp(CHANGE[0], CHANGE[1]);
-                let most = WIDEST * WIDEST * COARSEST;
-                self.factor = (self.factor * change).clamp(self.least.min(most), most);
+                self.factor *= change;
             }
+            self.most = match self.pays(effort, milliseconds) {
+                true => (self.most / FORGOTTEN).min(FASTEST),
+                false => (effort.pixel * effort.pixel / FINER).max(1.0),
+            };
+            self.factor = self.factor.clamp(self.least.min(self.most), self.most);
+        }
+        if effort == Effort::EXACT {
+            self.exact = Some(milliseconds);
         }
         self.last = Some(effort);
+    }
+
+    /// Returns whether the pixels of a moving frame are no wider than its time is worth.
+    fn pays(&self, effort: Effort, milliseconds: f64) -> bool {
+        let worth = effort.pixel.powf(PAYS);
+        self.exact.is_none_or(|exact| effort.pixel <= 1.0 || exact >= milliseconds * worth)
     }
 }
 
@@ -154,6 +178,27 @@ mod tests {
             }
             // No coarser than it must be.
             assert!(last > 20.0 || pace.factor == 1.0, "{exact}: {last}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_no_wider_than_they_pay() {
+        // Splats that take their time at every width, and a few that do not.
+        for (fixed, of_pixels, widest) in
+            [(100.0, 38.0, 1.5), (30.0, 108.0, 5.0), (5.0, 400.0, 8.0)]
+        {
+            let time = |effort: Effort| fixed + of_pixels / effort.pixel;
+            let mut pace = Pace::new(30.0);
+            pace.took(Effort::EXACT, time(Effort::EXACT));
+            let mut pixels = Vec::new();
+            for _ in 0..40 {
+                pace.changed();
+                let effort = pace.next().expect("a moving view needs a frame");
+                pixels.push(effort.pixel);
+                pace.took(effort, time(effort));
+            }
+            let last = pixels[20..].iter().copied().fold(0.0, f64::max);
+            assert!(last <= widest && last > 0.4 * widest, "{fixed} + {of_pixels}: {last}");
         }
     }
 

@@ -3,6 +3,7 @@
 use super::{Device, Renderer};
 use crate::{
     Result,
+    math::Camera,
     picture::Picture,
     plan::FrameStats,
     session::{Description, Loaded},
@@ -36,15 +37,24 @@ impl Loaded {
         device: &Device,
     ) -> Result<(Picture, FrameStats)> {
         let drawing = self.drawing(&description.picture)?;
-        let framing = description.framing()?;
-        self.find_seen(&framing, &drawing.settings)?;
-        let camera = framing.camera(&self.subject, drawing.free(0))?;
+        let camera = self.camera(description)?;
         let mut renderer = Renderer::new(device, &self.scene)?;
         let (picture, stats) = renderer
             .render(&camera, &drawing.settings)
             .map_err(|error| self.undrawn(error, &camera, drawing.settings.size).0)?;
         description.picture.require_content(&picture)?;
         Ok((drawing.reduced(picture, &self.items, &camera)?, stats))
+    }
+
+    /// Returns the camera of the picture that a description asks for.
+    ///
+    /// # Errors
+    /// Those of [`draw`](Self::draw) that come before anything is drawn.
+    pub fn camera(&mut self, description: &Description) -> Result<Camera> {
+        let drawing = self.drawing(&description.picture)?;
+        let framing = description.framing()?;
+        self.find_seen(&framing, &drawing.settings)?;
+        framing.camera(&self.subject, drawing.free(0))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Volumes: samples on a lattice, and the transfer functions that give them colour and opacity.
 
 mod automatic;
+mod coarser;
 mod colored;
 #[cfg(test)]
 mod contradictions;

@@ -29,8 +29,8 @@ const TASKS: [Task; 9] = [
     },
     Task {
         name: "publish",
-        flags: "output overwrite title viewer background json transfer range iso colormap color \
-            view azimuth elevation zoom up clip",
+        flags: "output overwrite quality limit title viewer background json transfer range iso \
+            colormap color view azimuth elevation zoom up clip",
         examples: "  splatkit publish scan.ply skull.nrrd scene.spz -o look.html
   splatkit publish head.nrrd --transfer ct-bone -o site",
     },

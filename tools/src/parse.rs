@@ -142,7 +142,7 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "a number of at least 0 is needed".into())
 }
 
-/// `1000000`, `512MiB`, `1.5GiB`, …
+/// `1000000`, `512MiB`, `1.5GiB`, `20MB`, …
 pub fn bytes(text: &str) -> Result<u64, String> {
     let (number, unit) =
         text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
@@ -151,7 +151,10 @@ pub fn bytes(text: &str) -> Result<u64, String> {
         "k" | "kib" => 1024.0,
         "m" | "mib" => 1024.0 * 1024.0,
         "g" | "gib" => 1024.0 * 1024.0 * 1024.0,
-        _ => return Err("the units are KiB, MiB and GiB".into()),
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        _ => return Err("the units are KiB, MiB and GiB, and KB, MB and GB".into()),
     };
     let number = positive(number.trim())
         .map_err(|_| "a number of bytes, such as 512MiB, is needed".to_owned())?;

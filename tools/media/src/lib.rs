@@ -1,8 +1,9 @@
-//! What becomes of finished pictures: films, several views in one, and texts over them. The command
-//! and the Python package share it.
+//! What becomes of pictures and scenes beside pictures: films, several views in one, texts over
+//! them, and pages for browsers. The command and the Python package share it.
 
 pub mod figure;
 pub mod overlay;
+pub mod page;
 pub mod video;
 
 use splatkit::Error;

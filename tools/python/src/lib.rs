@@ -11,6 +11,7 @@ mod files;
 mod film;
 mod hierarchy;
 mod notes;
+mod page;
 mod parts;
 mod picture;
 mod scene;

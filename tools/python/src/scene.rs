@@ -6,6 +6,7 @@ use crate::{
     cells::CellArrays,
     draw::{Added, Draw, Stage, Viewpoint},
     errors::{options, raise, wrong},
+    page::Collected,
     parts::{appearance, reading},
     picture::{Layers, Picture},
     worker::run,
@@ -28,17 +29,17 @@ use splatkit::{
         Layer, Name, OverlayEntry, PictureEntry, ReadingEntry, TransformEntry,
     },
     surface::Mesh,
-    volume::{Arrangement, Lattice, Volume},
+    volume::{Arrangement, Lattice, TransferFunction, Volume},
 };
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-/// What is drawn together.
+/// What is drawn together. If it is collected for a page, nothing is drawn.
 #[pyclass(frozen, module = "pysplatkit._pysplatkit")]
 #[derive(Default)]
-pub struct Scene(Arc<Stage>);
+pub struct Scene(Arc<Stage>, Option<Arc<Collected>>);
 
 /// What a caller says of an array.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -336,6 +337,11 @@ impl Scene {
         &self.0
     }
 
+    /// Returns what was collected.
+    fn collected(&self) -> Result<Arc<Collected>, Error> {
+        self.1.clone().ok_or_else(|| wrong("nothing was collected for a page"))
+    }
+
     /// Adds what an array has become, with its appearance.
     fn add(
         &self,
@@ -344,12 +350,16 @@ impl Scene {
         facts: ArrayFacts,
         more: (ReadingEntry, AppearanceEntry),
     ) -> PyResult<()> {
-        let (stage, (load, appearance)) = (self.0.clone(), more);
         input.warn_of_holes(&facts.name);
         let moved = facts.transform.apply(Path::new(&facts.name), &mut input);
         moved.map_err(|error| raise(py, &error))?;
-        let name = Name { text: facts.name, is_file: false };
         let stop = Stop::default();
+        if let Some(collected) = self.1.clone() {
+            let appearance = more.1;
+            return run(py, &stop, move || collected.add_array(input, &facts.name, appearance));
+        }
+        let (stage, (load, appearance)) = (self.0.clone(), more);
+        let name = Name { text: facts.name, is_file: false };
         let worker_stop = stop.clone();
         run(py, &stop, move || {
             let showing = load.complete(appearance.showing(&load.limits())?, Deadline::NEVER)?;
@@ -413,6 +423,33 @@ impl Scene {
         Self::default()
     }
 
+    /// Returns an empty scene that collects for a page what is added, instead of drawing it.
+    #[staticmethod]
+    fn collecting() -> Self {
+        Self(Arc::default(), Some(Arc::default()))
+    }
+
+    /// Sets the transfer functions of the input that was collected last, one for each field.
+    fn show_last(&self, py: Python<'_>, transfers: Vec<String>) -> PyResult<()> {
+        let read = transfers.iter().map(|text| TransferFunction::from_json(text));
+        let set = read.collect::<Result<Vec<_>, _>>().and_then(|transfers| {
+            let collected = self.1.as_ref();
+            collected.map_or(Ok(()), |collected| collected.show_last(transfers))
+        });
+        set.map_err(|error| raise(py, &error))
+    }
+
+    /// Makes a page of what was collected. Returns what was written, as JSON.
+    fn page(&self, py: Python<'_>, described: &str, wanted: &str) -> PyResult<String> {
+        let made = self.collected().and_then(|collected| {
+            let mut scene = self::described(described)?;
+            scene.inputs = collected.inputs();
+            Ok((collected, scene, options(wanted)?))
+        });
+        let (collected, scene, wanted) = made.map_err(|error| raise(py, &error))?;
+        run(py, &Stop::default(), move || collected.page(&scene, &wanted))
+    }
+
     /// Adds a file.
     fn add_file(
         &self,
@@ -426,6 +463,12 @@ impl Scene {
             .and_then(|load| Ok((load, self::appearance(appearance)?, options(facts)?)));
         let parsed: (_, _, FileFacts) = parsed.map_err(|error| raise(py, &error))?;
         let (load, appearance, facts) = parsed;
+        if let Some(collected) = &self.1 {
+            let FileFacts { transform, edits, .. } = facts;
+            let new = InputEntry::new(path);
+            collected.add(InputEntry { reading: load, appearance, transform, edits, ..new });
+            return Ok(());
+        }
         let (stage, stop) = (self.0.clone(), Stop::default());
         let worker_stop = stop.clone();
         run(py, &stop, move || {
@@ -443,7 +486,7 @@ impl Scene {
 
     /// Returns a scene of the first inputs alone, which shares what they were made into.
     fn forked(&self, count: usize) -> Self {
-        Self(Arc::new(self.0.forked(count)))
+        Self(Arc::new(self.0.forked(count)), None)
     }
 
     /// Adds the samples of an array for each channel, and those that say how opaque they are.
@@ -685,6 +728,16 @@ struct Described {
     engine: Option<Engine>,
 }
 
+/// Returns a scene without inputs.
+fn described(text: &str) -> Result<Description, Error> {
+    let Described { camera, framing, picture, overlay, engine } = options(text)?;
+    let mut scene = Description::new([]);
+    (scene.camera, scene.framing) = (camera, framing);
+    (scene.picture, scene.overlay) = (picture, overlay);
+    scene.engine = engine.unwrap_or_default();
+    Ok(scene)
+}
+
 /// Writes a scene file: inputs with how each is read, shown and moved as JSON, and how the picture
 /// is drawn.
 #[pyfunction]
@@ -695,17 +748,13 @@ pub fn write_scene(
     described: &str,
 ) -> PyResult<()> {
     let made = || -> Result<Description, Error> {
-        let mut scene = Description::new([]);
+        let mut scene = self::described(described)?;
         for (file, load, appearance, transform, edits) in inputs {
             let (reading, appearance) = (reading(&load)?, self::appearance(&appearance)?);
             let (transform, edits) = (options(&transform)?, options(&edits)?);
             let new = InputEntry::new(file);
             scene.inputs.push(InputEntry { reading, appearance, transform, edits, ..new });
         }
-        let Described { camera, framing, picture, overlay, engine } = options(described)?;
-        (scene.camera, scene.framing) = (camera, framing);
-        (scene.picture, scene.overlay) = (picture, overlay);
-        scene.engine = engine.unwrap_or_default();
         scene.check().map_err(|(place, message)| wrong(format!("{place}: {message}")))?;
         Ok(scene)
     };

@@ -162,3 +162,20 @@ def data(tmp_path_factory):
     pysplatkit.convert(folder / "bytes.npy", folder / "bricks.splv")
     pysplatkit.convert(folder / "colors.ply", folder / "trained.spz")
     return folder
+
+
+#: The word “engine”, packed by lzip.
+ENGINE = bytes.fromhex(
+    "4c5a4950011a00329b8919dfb867cdf97ffffcd5c0008d1aa8e806000000000000002a00000000000000"
+)
+
+
+@pytest.fixture
+def viewer(tmp_path):
+    """A viewer that draws nothing."""
+    folder = tmp_path / "viewer"
+    folder.mkdir()
+    for name in ("splatkit-worker.js", "splatkit-viewer.js", "splatkit-unpack.wasm"):
+        (folder / name).write_text(f"// {name}")
+    (folder / "splatkit.wasm.lz").write_bytes(ENGINE)
+    return folder

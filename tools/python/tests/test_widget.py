@@ -382,3 +382,56 @@ except ImportError as error:
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert 'pip install "pysplatkit[notebook]"' in ran.stdout
+
+
+def test_the_browser_draws_the_page_of_the_scene(scene, viewer, monkeypatch, tmp_path):
+    monkeypatch.setenv("SPLATKIT_VIEWER", str(viewer))
+    widget = rest(scene.show(size=SIZE, background="white", scalar_bar=True))
+    sent = messages(widget)
+    assert widget._has_page
+    parts = []
+    while not parts or len(parts) < parts[0][0]["count"]:
+        tell(widget, ("page", {"number": len(parts)}))
+        pages = eventually(lambda: [m for m in sent if m[0]["type"] == "page"][len(parts) :])
+        parts.append(pages[0])
+    scene.save_html(tmp_path / "a.html", widget.camera, viewer=viewer, background="white")
+    assert b"".join(part[1][0] for part in parts) == (tmp_path / "a.html").read_bytes()
+
+    # The kernel no longer draws, but knows the camera.
+    tell(widget, ("local", {"is_local": True}))
+    sent.clear()
+    camera = json.loads(scene.camera(SIZE, view="left").to_json())
+    tell(widget, ("camera", {"camera": camera}))
+    assert widget.camera == scene.camera(SIZE, view="left")
+    assert {message["type"] for message, _ in sent} == {"idle"}
+    widget.camera = scene.camera(SIZE, view="top")
+    assert [m["camera"] for m, _ in sent if m["type"] == "camera"] == [
+        json.loads(widget.camera.to_json())
+    ]
+    wanted = scene.render(SIZE, widget.camera, background="white", scalar_bar=True).rgba
+    assert np.array_equal(widget.snapshot(), wanted)
+    # A changed scene has another page. Until it is there, the kernel draws.
+    widget.refresh()
+    assert [m["type"] for m, _ in sent].count("stale") == 1 and not widget._is_local
+    widget.close()
+
+
+def test_the_kernel_draws_what_no_page_shows(viewer, monkeypatch, scene):
+    with pytest.raises(pysplatkit.ArgumentError, match="draws is one of"):
+        scene.show(draws="moon")
+    assert not scene.show(size=SIZE, draws="kernel")._has_page
+    monkeypatch.setenv("SPLATKIT_VIEWER", str(viewer))
+    samples = Scene().add_samples(ball()[0], np.ones(len(ball()[0])), radii=np.full(len(ball()[0]), 0.2))
+    widget = rest(samples.show(size=SIZE, draws="browser"))
+    tell(widget, ("page", {"number": 0}))
+    assert "scattered samples" in eventually(lambda: widget._error)
+    assert not widget._has_page
+
+
+def eventually(found):
+    """Waits until a function returns something."""
+    for _ in range(600):
+        if answer := found():
+            return answer
+        time.sleep(0.05)
+    raise AssertionError("nothing came")

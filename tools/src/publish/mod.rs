@@ -1,32 +1,24 @@
 //! `splatkit publish`: a page that shows a scene, as one file or as a folder for a static host.
 //!
-//! The page has the scene file, the files of its inputs, and the viewer of tools/web, which draws
-//! by the CPU engine. So it shows what `splatkit render` draws of the same scene.
+//! The page itself is made by `splatkit_media::page`, which the Python package uses, too.
 
 #[cfg(feature = "serve")]
 mod answer;
-mod content;
-mod inputs;
-mod packing;
-mod page;
 #[cfg(feature = "serve")]
 mod serve;
-mod viewer;
 
 use crate::{
-    failure::Failure, given::Given, job::Job, output, progress::Progress, render::Render,
+    failure::Failure, given::Given, job::Job, output, parse, progress::Progress, render::Render,
     timing::milliseconds,
 };
 use clap::Args;
-use inputs::Published;
-use page::Page;
 #[cfg(feature = "serve")]
 pub use serve::Serve;
+use splatkit_media::page::{Page, Viewer, Wish};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
 };
-use viewer::Viewer;
 
 /// Flags of `render` that are not for pages, which have their own sizes and one view.
 const NOT_OF_PAGES: [&str; 18] = [
@@ -79,6 +71,14 @@ pub struct Publish {
     scene: Render,
     #[command(flatten)]
     page: PageFlags,
+    /// Show this share of points, triangles, Gaussians and samples, such as 40%: the page has fewer
+    /// bytes
+    #[arg(long, value_name = "PERCENT", value_parser = quality, help_heading = "Page")]
+    quality: Option<f64>,
+    /// Show as much as a page of this size can hold, such as 20MB. The viewer has about 2.3 MB in
+    /// one file, and 9 MB in a folder
+    #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = "Page")]
+    limit: Option<u64>,
 }
 
 /// What a page is made of, besides the scene.
@@ -104,7 +104,10 @@ impl Publish {
         let target = self.target()?;
         target.check(self.scene.overwrites())?;
         let viewer = Viewer::find(self.page.viewer.as_deref())?;
-        let page = self.page.page(&self.scene, &job, &viewer, progress);
+        let (share, limit) = (self.quality, self.limit);
+        let is_one_file = matches!(target, Target::File(_));
+        let wish = Wish { share, limit, is_one_file, ..self.page.wish() };
+        let page = page_of(&self.scene, &job, &viewer, (&wish, progress));
         let written = target.path();
         page.and_then(|page| target.write(&page, &viewer, (self.scene.prints_json(), progress)))
             .map_err(|failure| job.blamed(failure, &[written]))
@@ -138,39 +141,43 @@ fn check_flags(given: &Given) -> Result<(), Failure> {
 }
 
 impl PageFlags {
-    /// Reads the inputs, and makes the page of them.
-    fn page(
-        &self,
-        scene: &Render,
-        job: &Job,
-        viewer: &Viewer,
-        progress: &Progress,
-    ) -> Result<Page, Failure> {
-        let start = Instant::now();
-        let mut loaded = job.load(progress)?;
-        if let Some(warning) = job.idle(&loaded.scene) {
-            progress.warn(warning);
-        }
-        if job.scene.overlay != Default::default() {
-            progress.warn(
-                "texts over pictures (--scalar-bar, --axes, --scale-bar, --caption) are not shown \
-                 in pages yet",
-            );
-        }
-        let written = scene.output().unwrap_or(Path::new(""));
-        output::check_unneeded(written, &loaded.files)?;
-        progress.stage("Collecting the inputs");
-        let Published { scene, files } = inputs::published(&job.scene, &mut loaded, progress)?;
-        tracing::info!(milliseconds = milliseconds(start), "read and collected");
-        let title = self.title.clone().unwrap_or_else(|| {
-            let names = job.inputs().into_iter();
-            let names = names.map(|file| inputs::name_of(&file)).collect::<Vec<_>>();
-            names.join(", ")
-        });
-        let background = scene.picture.background();
-        let scene = inputs::text_of(&scene);
-        Ok(Page { title, scene, files, background, version: viewer.version() })
+    /// Returns what is wanted of the page.
+    fn wish(&self) -> Wish {
+        Wish { title: self.title.clone(), ..Wish::default() }
     }
+}
+
+/// Reads a share in percent.
+fn quality(text: &str) -> Result<f64, String> {
+    let number = text.trim().trim_end_matches('%').trim().parse().ok();
+    let share = number.filter(|percent: &f64| *percent > 0.0 && *percent <= 100.0);
+    share.map(|percent| percent / 100.0).ok_or("a share is above 0 % and at most 100 %".into())
+}
+
+/// Reads the inputs, and makes the page of them.
+fn page_of(
+    scene: &Render,
+    job: &Job,
+    viewer: &Viewer,
+    (wish, progress): (&Wish, &Progress),
+) -> Result<Page, Failure> {
+    let start = Instant::now();
+    let mut loaded = job.load(progress)?;
+    if let Some(warning) = job.idle(&loaded.scene) {
+        progress.warn(warning);
+    }
+    if job.scene.overlay != Default::default() {
+        progress.warn(
+            "texts over pictures (--scalar-bar, --axes, --scale-bar, --caption) are not shown in \
+             pages yet",
+        );
+    }
+    let written = scene.output().unwrap_or(Path::new(""));
+    output::check_unneeded(written, &loaded.files)?;
+    progress.stage("Collecting the inputs");
+    let page = Page::new(&job.scene, &mut loaded, viewer, wish, &|step| progress.stage(step))?;
+    tracing::info!(milliseconds = milliseconds(start), "read and collected");
+    Ok(page)
 }
 
 /// Where a page goes.
@@ -219,17 +226,23 @@ impl Target {
         progress.clear();
         if is_json {
             let mut files = serde_json::Map::new();
-            for (name, content) in &page.files {
+            for (name, content) in page.files() {
                 files.insert(name.clone(), content.len()?.into());
             }
             return output::json(&serde_json::json!({
                 "output": self.path().to_string_lossy(),
                 "bytes": bytes,
                 "files": files,
+                "share": page.share,
+                "psnr": page.likeness,
             }));
         }
         let megabytes = bytes as f64 / 1e6;
-        output::line(format_args!("{}: {megabytes:.2} MB", self.path().display()))?;
+        let shown = match page.share {
+            share if share < 1.0 => format!(", {}", shown(share, page.likeness)),
+            _ => String::new(),
+        };
+        output::line(format_args!("{}: {megabytes:.2} MB{shown}", self.path().display()))?;
         if let Self::Folder(path) = self {
             let place = path.display();
             progress.note(format_args!(
@@ -238,5 +251,27 @@ impl Target {
             ));
         }
         Ok(())
+    }
+}
+
+/// Says how much a page shows, and how alike its picture is.
+fn shown(share: f64, likeness: Option<f64>) -> String {
+    let percent = 100.0 * share;
+    let digits = if percent < 10.0 { 1 } else { 0 };
+    let likeness = likeness.map(|psnr| format!(", a small picture of it has {psnr:.1} dB"));
+    format!("{percent:.digits$} % of the inputs{}", likeness.unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quality;
+
+    #[test]
+    fn shares_are_read() {
+        assert_eq!(quality("40%"), Ok(0.4));
+        assert_eq!(quality(" 100 "), Ok(1.0));
+        for wrong in ["0", "101", "-3%", "half", "NaN"] {
+            assert!(quality(wrong).is_err(), "{wrong}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 //! `splatkit publish`. Hierarchies and bricks are read from the disk, part by part, as the page
 //! asks for them; so is a folder that was published. The rest stays in memory.
 
-use super::{PageFlags, answer::Answer, check_flags, content::Content, viewer::Viewer};
+use super::{PageFlags, answer::Answer, check_flags, page_of};
 use crate::{failure::Failure, given::Given, output, progress::Progress, render::Render};
 use clap::Args;
 use hyper::{
@@ -14,6 +14,7 @@ use hyper::{
 };
 use hyper_util::rt::TokioIo;
 use splatkit::Error;
+use splatkit_media::page::{Content, Viewer};
 use std::{
     collections::BTreeMap,
     convert::Infallible,
@@ -83,14 +84,14 @@ struct Files {
 enum Served {
     Held(Bytes),
     /// A file on this machine, which is opened for each request.
-    Kept(PathBuf),
+    Kept(Content),
 }
 
 impl Files {
     fn new(all: impl IntoIterator<Item = (String, Content)>) -> Self {
         let served = |content| match content {
             Content::Held(bytes) => Served::Held(bytes.into()),
-            Content::Kept(path) => Served::Kept(path),
+            file => Served::Kept(file),
         };
         let all = all.into_iter().map(|(name, content)| (name, served(content))).collect();
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -102,7 +103,8 @@ impl Files {
     fn open(&self, path: &str) -> Option<(Answer, String)> {
         match self.all.get(path)? {
             Served::Held(bytes) => Some((Answer::held(bytes.clone()), format!("\"{}\"", self.tag))),
-            Served::Kept(path) => {
+            Served::Kept(content) => {
+                let path = content.file()?;
                 // Not what a link leads to, by now.
                 path.symlink_metadata().ok().filter(|meta| meta.is_file())?;
                 let file = fs::File::open(path).ok()?;
@@ -130,9 +132,10 @@ impl Serve {
             _ => {
                 let job = self.scene.job(given)?;
                 let viewer = Viewer::find(self.page.viewer.as_deref())?;
-                let page = self.page.page(&self.scene, &job, &viewer, progress);
+                let wish = self.page.wish();
+                let page = page_of(&self.scene, &job, &viewer, (&wish, progress));
                 let page = page.map_err(|failure| job.blamed(failure, &[]))?;
-                Files::new(page.in_files(&viewer))
+                Files::new(page.in_files(&viewer)?)
             }
         };
         progress.clear();

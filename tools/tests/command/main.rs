@@ -22,6 +22,7 @@ mod idle_flags;
 mod interrupted;
 mod licences;
 mod medical;
+mod pages;
 mod parts;
 mod pictures;
 #[cfg(unix)]

@@ -59,7 +59,7 @@ class Item:
     def put(self, native: _pysplatkit.Scene) -> None:
         """Adds the item to a scene of the compiled half."""
         _PUT[self.method](native, self)
-        if self.transfer is not None:
+        if self.transfer is not None and native.contents:
             last = len(native.contents) - 1
             _pysplatkit.set_transfer(native, last, self.transfer)
 

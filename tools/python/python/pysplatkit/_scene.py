@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from . import _film, _items, _neighbours, _options, _pysplatkit, _values
+from . import _film, _items, _neighbours, _options, _page, _pysplatkit, _values
 from ._camera import Camera, Clip
 from ._errors import ArgumentError
 from ._items import Item
@@ -101,21 +101,45 @@ class Scene:
             raise ArgumentError("a scene file names files: a scene of arrays cannot be saved")
         if not files:
             raise ArgumentError("the scene is empty")
-        given = _options.checked(drawing, _options.DRAWING | _options.PAGE | _options.VIEW, "save")
-        view = {name: given.pop(name) for name in _options.VIEW & given.keys()}
-        draw = self._drawing({**given, "size": size}, camera is not None or "view" in view)
-        if "background" in drawing:
-            draw["background"] = _options.background(drawing["background"]) or "none"
-        framing = self._described.get("framing") or {} if camera is None else {}
-        shot = None if camera is None else json.loads(camera.to_json())
-        described = {
-            "camera": self._described.get("camera") if camera is None and not view else shot,
-            "framing": {**framing, **json.loads(_options.fit(**view))},
-            "engine": draw.pop("engine", None),
-            "overlay": {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()},
-            "picture": json.loads(_options.drawn(**draw)),
-        }
+        described = self._said(camera, {**drawing, "size": size}, "save")
         _pysplatkit.write_scene(os.fspath(path), files, json.dumps(described))
+
+    def save_html(
+        self,
+        path: PathLike,
+        camera: Camera | None = None,
+        *,
+        title: str | None = None,
+        quality: float | None = None,
+        limit: int | str | None = None,
+        viewer: PathLike | None = None,
+        **drawing: Unpack[Framed],
+    ) -> dict[str, Any]:
+        """Writes a page that shows the scene in a browser, as `splatkit publish` does
+        (docs/browser.md). Arrays become files in the page.
+
+        >>> scene.save_html("look.html", limit="20MB")
+
+        Args:
+            path: An .html file with everything inside, which opens by a double click; or a folder
+                for a static host.
+            camera: The first view. Default: one that is fitted to the scene.
+            title: The title of the page. Default: the names of the files.
+            quality: The share of points, triangles, Gaussians and samples that is shown, up to 1.
+            limit: Most bytes of the page, as a number or a text such as "20MB". As much is shown
+                as fits.
+            viewer: The folder that tools/web/build has made. Default: what the package contains.
+            drawing: The other options of `render`.
+
+        Returns:
+            The `bytes` of the page; the `share` that it shows; and `psnr`, how alike its picture is
+            in dB, if it shows less or inputs were converted.
+        """
+        if not self._items:
+            raise ArgumentError("the scene is empty")
+        _options.checked(drawing, _options.DRAWING | _options.VIEW, "save_html")
+        described = self._said(camera, drawing, "save_html")
+        return _page.write(self, path, described, (title, quality, limit, viewer))
 
     def add(
         self, source: Any, *, name: str | None = None, **options: Unpack[SourceOptions]
@@ -660,6 +684,7 @@ class Scene:
         self,
         camera: Camera | None = None,
         size: tuple[int, int] = (800, 600),
+        draws: str = "auto",
         **drawing: Unpack[Drawing],
     ) -> Widget:
         """Returns a widget for notebooks, in which the scene is turned by hand.
@@ -669,6 +694,9 @@ class Scene:
         Args:
             camera: The first view. Default: that of `Scene.camera`.
             size: Width and height on the screen, in pixels of CSS.
+            draws: kernel, browser or auto. The browser gets the page that `save_html` writes, and
+                draws once it has come; until then the kernel does. `auto` leaves pages above 16 MB
+                to the kernel, and what pages do not show.
             drawing: The other options of `render`.
         """
         try:
@@ -678,7 +706,7 @@ class Scene:
                 raise
             message = 'Scene.show needs anywidget: pip install "pysplatkit[notebook]"'
             raise ImportError(message, name=error.name) from error
-        return Widget(self, camera, size, **drawing)
+        return Widget(self, camera, size, draws, **drawing)
 
     @property
     def names(self) -> list[str]:
@@ -850,6 +878,27 @@ class Scene:
         """Draws with options by their names."""
         text = None if camera is None else camera.to_json()
         return self._native.render(text, fit, _options.drawn(**draw))
+
+    def _said(
+        self, camera: Camera | None, given: Mapping[str, Any], method: str
+    ) -> dict[str, Any]:
+        """Returns what a scene file says beside the inputs: what is given, and otherwise what the
+        scene file says that `open` has read."""
+        known = _options.DRAWING | _options.PAGE | _options.VIEW | {"size"}
+        options = _options.checked(given, known, method)
+        view = {name: options.pop(name) for name in _options.VIEW & options.keys()}
+        draw = self._drawing(options, camera is not None or "view" in view)
+        if "background" in given:
+            draw["background"] = _options.background(given["background"]) or "none"
+        framing = self._described.get("framing") or {} if camera is None else {}
+        shot = None if camera is None else json.loads(camera.to_json())
+        return {
+            "camera": self._described.get("camera") if camera is None and not view else shot,
+            "framing": {**framing, **json.loads(_options.fit(**view))},
+            "engine": draw.pop("engine", None),
+            "overlay": {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()},
+            "picture": json.loads(_options.drawn(**draw)),
+        }
 
     def _turn(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +31,12 @@ _OPTIONS = _options.DRAWING
 _FAILURES = (Error, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 #: Most pixels of the screen in a pixel of CSS that are drawn.
 _MOST_PIXELS = 3.0
+#: What draws: the browser if it can, the browser, or the kernel.
+_PLACES = ("auto", "browser", "kernel")
+#: Most bytes of a page that the browser gets unasked.
+_MOST_PAGE = 16_000_000
+#: The bytes of a page that are sent at once.
+_CHUNK = 1 << 18
 
 
 class _CameraTrait(traitlets.Instance[Camera]):
@@ -50,6 +57,9 @@ class Widget(anywidget.AnyWidget):
 
     Coarse frames follow the hand. When it rests, the exact picture is drawn: the one that
     `Scene.render` returns for `widget.camera`, `widget.pixels` and the same options.
+
+    The kernel draws at once. Meanwhile the browser gets the page that `Scene.save_html` writes, if
+    that is not too large, and draws from then on.
     """
 
     _esm = _STATIC / "widget.js"
@@ -74,17 +84,28 @@ class Widget(anywidget.AnyWidget):
     #: What is shown: its size and the milliseconds that it took.
     _status = traitlets.Dict().tag(sync=True)
     _error = traitlets.Unicode("").tag(sync=True)
+    #: Whether the browser may ask for a page that it draws itself.
+    _has_page = traitlets.Bool(False).tag(sync=True)
 
     _painter: Painter | None = None
+    #: The camera that the browser has moved, as JSON, until that is known here.
+    _moved: str | None = None
 
     def __init__(
         self,
         scene: Scene,
         camera: Camera | None = None,
         size: tuple[int, int] = (800, 600),
+        draws: str = "auto",
         **drawing: Any,
     ) -> None:
+        if draws not in _PLACES:
+            raise ArgumentError(f"draws is one of {', '.join(_PLACES)}, not {draws!r}")
         self._scene = scene
+        self._place = draws
+        # The page that the browser draws, and whether it does.
+        self._page: bytes | None = None
+        self._is_local = False
         self._drawing = _options.checked(drawing, _OPTIONS, "show")
         self._background = _options.background(drawing.get("background", "black"))
         self._drawing.pop("background", None)
@@ -107,6 +128,7 @@ class Widget(anywidget.AnyWidget):
         super().__init__(
             camera=start,
             size=size,
+            _has_page=draws != "kernel",
             _presets=list(_pysplatkit.TRANSFER_FUNCTIONS),
             _maps=list(_pysplatkit.COLOR_MAPS),
         )
@@ -178,6 +200,10 @@ class Widget(anywidget.AnyWidget):
             self._ranges = [field["range"] for field in fields]
             self._histograms = [histograms.get(id(field["of"]), []) for field in self._fields]
             self._transfers = [field["transfer"] for field in fields]
+        if self._page is not None or self._is_local:
+            # The browser asks for the new page.
+            self._page, self._is_local = None, False
+            self.send({"type": "stale"})
         for number, counts in enumerate(self._histograms):
             if not counts:
                 threading.Thread(target=self._count, args=(number,), daemon=True).start()
@@ -254,7 +280,63 @@ class Widget(anywidget.AnyWidget):
         text = _pysplatkit.checked_transfer(json.dumps(transfer))
         self._set_transfer(field, json.loads(text))
 
+    def _on_camera(self, camera: dict[str, Any]) -> None:
+        """The browser has moved the camera, and draws by itself."""
+        moved = Camera.from_json(json.dumps(camera))
+        self._moved = moved.to_json()
+        self.camera = moved
+
+    def _on_local(self, is_local: bool) -> None:
+        """The browser draws from now on, or no longer does."""
+        self._is_local = bool(is_local)
+        if self._is_local and self._painter is not None:
+            self._painter.order(None)
+        elif not self._is_local:
+            self._draw()
+
+    def _on_page(self, number: int) -> None:
+        """Sends a part of the page that the browser draws."""
+        if self._page is None:
+            threading.Thread(target=self._make_page, daemon=True).start()
+        else:
+            self._send_page(number)
+
     # How that is done.
+
+    def _make_page(self) -> None:
+        """Makes the page, on a thread of its own."""
+        scene, drawing = self._scene, dict(self._drawing)
+        for name in _options.OVERLAY & drawing.keys():
+            del drawing[name]
+        reason = ""
+        page = b""
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "page.html"
+                behind = self._background or "none"
+                scene.save_html(path, self.camera, background=behind, **drawing)
+                page = path.read_bytes()
+            if self._place == "auto" and len(page) > _MOST_PAGE:
+                reason = f"the page has {len(page) / 1e6:.0f} MB"
+        except _FAILURES as error:
+            reason = str(error)
+
+        def take() -> None:
+            if reason:
+                self._has_page = False
+                if self._place == "browser":
+                    self._error = f"The kernel draws, and not the browser: {reason}"
+                return
+            self._page = page
+            self._send_page(0)
+
+        self._later(take)
+
+    def _send_page(self, number: int) -> None:
+        page = self._page or b""
+        count = -(-len(page) // _CHUNK)
+        part = page[number * _CHUNK : (number + 1) * _CHUNK]
+        self.send({"type": "page", "number": number, "count": count}, [part])
 
     def _draws(self, size: tuple[int, int]) -> str:
         return _options.drawn(size, **self._drawing)
@@ -274,7 +356,13 @@ class Widget(anywidget.AnyWidget):
         )
 
     def _draw(self) -> None:
-        if self._painter is not None:
+        if self._is_local:
+            # What the browser itself has moved, it shows already.
+            camera = self.camera.to_json()
+            if self._moved != camera:
+                self.send({"type": "camera", "camera": json.loads(camera)})
+            self._moved = None
+        elif self._painter is not None:
             self._orders += 1
             self._still = b""
             self._painter.order(self._order())

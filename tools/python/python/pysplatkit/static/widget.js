@@ -7,6 +7,8 @@ const PATIENCE = 3000;
 const AHEAD = 2;
 /** Most pixels of the screen in one of CSS that are drawn. */
 const MOST_RATIO = 3;
+/** The pause between parts of a page, in milliseconds: notebook servers take 1 MB a second. */
+const PACE = 280;
 /** A turn by an arrow key, as a share of the picture's height. */
 const STEP = 1 / 36;
 /** The drag that doubles the window, and the one that moves the level over all values, in pixels. */
@@ -262,6 +264,82 @@ class View {
   fail(message) {
     this.error.textContent = message;
     this.error.hidden = !message;
+  }
+}
+
+/**
+ * The page of the scene, which draws in the browser. Its parts come one by one, slowly enough that
+ * notebook servers let them pass. Until it draws, and if it cannot, the kernel's pictures are shown.
+ */
+class Page {
+  constructor(model, hand, view) {
+    this.model = model;
+    this.hand = hand;
+    this.view = view;
+    this.clear();
+  }
+
+  clear() {
+    clearTimeout(this.timer);
+    this.frame?.remove();
+    if (this.url) URL.revokeObjectURL(this.url);
+    [this.frame, this.url, this.viewer, this.timer] = [null, null, null, null];
+    this.parts = [];
+    this.view.canvas.hidden = false;
+  }
+
+  /** Asks for the page. */
+  ask() {
+    if (this.model.get("_has_page")) this.hand.do("page", { number: this.parts.length });
+  }
+
+  /** Takes a part. */
+  take({ number, count }, buffer) {
+    if (number !== this.parts.length || this.frame) return;
+    this.parts.push(buffer);
+    if (this.parts.length === count) this.open();
+    else this.timer = setTimeout(() => this.ask(), PACE);
+  }
+
+  open() {
+    this.url = URL.createObjectURL(new Blob(this.parts, { type: "text/html" }));
+    this.frame = make("iframe", { className: "splatkit-page", title: "Picture of a scene", src: this.url });
+    this.frame.hidden = true;
+    this.frame.addEventListener("load", () => {
+      // Some hosts let no frame be looked into: the kernel goes on.
+      this.viewer = this.frame?.contentDocument?.querySelector("splatkit-viewer");
+      if (this.viewer) this.listen();
+    });
+    this.view.frame.append(this.frame);
+  }
+
+  listen() {
+    const on = (name, listener) => this.viewer.addEventListener(name, listener);
+    on("frame", ({ detail }) => {
+      if (this.frame.hidden) this.begin();
+      const size = [detail.width, detail.height];
+      this.view.tell({ size, exact: detail.isExact, milliseconds: detail.milliseconds });
+      this.view.status.textContent += " · browser";
+    });
+    on("camerachange", ({ detail }) => this.hand.do("camera", { camera: detail.camera }));
+    on("error", ({ detail }) => {
+      if (!detail.isFatal) return;
+      this.clear();
+      this.hand.do("local", { is_local: false });
+    });
+  }
+
+  /** Draws from now on. */
+  begin() {
+    this.frame.hidden = false;
+    this.view.canvas.hidden = true;
+    this.hand.do("local", { is_local: true });
+    this.setTransfers();
+  }
+
+  /** Takes the functions that the kernel has. */
+  setTransfers() {
+    this.model.get("_transfers").forEach((transfer, field) => this.viewer?.setTransfer(transfer, field));
   }
 }
 
@@ -592,17 +670,20 @@ class Editor {
   }
 }
 
-function buttons(model, hand) {
+function buttons(model, hand, page) {
   const button = (text, title, onClick) => {
     const element = make("button", { type: "button", textContent: text, title });
     element.addEventListener("click", onClick);
     return element;
   };
   const side = (name, text, title) => button(text, title, () => hand.do("view", { name }));
-  const save = () => {
-    const png = model.get("_still");
-    if (!png?.byteLength) return;
-    const href = URL.createObjectURL(new Blob([png], { type: "image/png" }));
+  const save = async () => {
+    const still = model.get("_still");
+    const png = page.viewer
+      ? await page.viewer.picture("image/png")
+      : still?.byteLength && new Blob([still], { type: "image/png" });
+    if (!png) return;
+    const href = URL.createObjectURL(png);
     make("a", { href, download: "picture.png" }).click();
     setTimeout(() => URL.revokeObjectURL(href), 1000);
   };
@@ -621,7 +702,8 @@ function render({ model, el }) {
   const hand = new Hand(model, () => editor.sync(), late);
   const view = new View(model, hand, (wider, higher) => editor.moveWindow(wider, higher));
   const editor = new Editor(model, hand);
-  const tools = make("div", { className: "splatkit-tools" }, ...buttons(model, hand));
+  const page = new Page(model, hand, view);
+  const tools = make("div", { className: "splatkit-tools" }, ...buttons(model, hand, page));
   const bar = make("div", { className: "splatkit-bar" }, view.status, tools);
   view.root.append(bar);
   const root = make("div", { className: "splatkit" }, view.root, editor.root);
@@ -642,7 +724,13 @@ function render({ model, el }) {
     hand.answered(model.get("_status").answers);
   };
   on("msg:custom", (message, buffers) => {
-    if (message.type === "frame") view.show(buffers[0], message);
+    if (message.type === "frame" && !page.viewer) view.show(buffers[0], message);
+    if (message.type === "page") page.take(message, buffers[0]);
+    if (message.type === "camera" && page.viewer) page.viewer.camera = message.camera;
+    if (message.type === "stale") {
+      page.clear();
+      page.ask();
+    }
     hand.answered(message.answers);
   });
   on("change:_still", showStill);
@@ -651,7 +739,10 @@ function render({ model, el }) {
   on("change:_histograms", () => editor.sync());
   on("change:field", () => editor.sync());
   // What comes back of the hand's own changes may be older than they are.
-  on("change:_transfers", () => hand.isIdle && editor.sync());
+  on("change:_transfers", () => {
+    if (hand.isIdle) editor.sync();
+    page.setTransfers();
+  });
   view.fail(model.get("_error"));
   showStill();
   // The ratio changes with the screen and with the zoom of the page.
@@ -662,10 +753,12 @@ function render({ model, el }) {
     hand.do("ready", { ratio });
   };
   measure();
+  page.ask();
   window.addEventListener("resize", measure);
 
   return () => {
     hand.stop();
+    page.clear();
     window.removeEventListener("resize", measure);
     for (const [name, listener] of listeners) model.off(name, listener);
   };

@@ -3,6 +3,9 @@
 
 use std::{env, fs, path::Path};
 
+const FILES: [&str; 4] =
+    ["splatkit-worker.js", "splatkit-viewer.js", "splatkit.wasm.lz", "splatkit-unpack.wasm"];
+
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(splatkit_viewer)");
     println!("cargo::rerun-if-env-changed=SPLATKIT_VIEWER");
@@ -10,7 +13,7 @@ fn main() {
         return;
     };
     let out = env::var_os("OUT_DIR").expect("cargo names a folder");
-    for name in ["splatkit-worker.js", "splatkit-viewer.js", "splatkit.wasm"] {
+    for name in FILES {
         let from = Path::new(&folder).join(name);
         println!("cargo::rerun-if-changed={}", from.display());
         fs::copy(&from, Path::new(&out).join(name)).unwrap_or_else(|error| {

@@ -3,6 +3,9 @@
 /** The bytes whose columns were turned at once. */
 const BLOCK = 1 << 18;
 
+/** What unpacks lzip: the exports of tools/web/unpack. */
+let unpacker = null;
+
 /** Takes bytes out of letters of seven bits. */
 function bytesOf(text) {
   const bytes = new Uint8Array(Math.floor((text.length * 7) / 8));
@@ -34,25 +37,43 @@ function turnedBack(turned, strides) {
       }
     }
   });
-  return bytes.buffer;
+  return bytes;
+}
+
+/** Unpacks gzip, as browsers do. */
+async function gunzipped(packed) {
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Unpacks lzip to this many bytes. */
+function unzipped(packed, count) {
+  const { memory, room, unpack } = unpacker;
+  const place = room(packed.length);
+  new Uint8Array(memory.buffer).set(packed, place);
+  const start = unpack(count);
+  if (start === 0) throw new Error("damaged");
+  return new Uint8Array(memory.buffer, start, count).slice();
 }
 
 /** Takes the bytes out of an element. */
 async function unpacked(element) {
+  const { by, count, strides } = element.dataset;
   const packed = bytesOf(element.textContent);
   element.remove();
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   let bytes;
   try {
-    bytes = await new Response(stream).arrayBuffer();
+    bytes = by === "lzip" ? unzipped(packed, Number(count)) : await gunzipped(packed);
   } catch {
     throw new Error("This page is damaged: a part of it cannot be unpacked. Get the file again; programs that change texts may have changed it.");
   }
-  const strides = element.dataset.strides.split(" ").filter(Boolean).map(Number);
-  return strides.length > 0 ? turnedBack(new Uint8Array(bytes), strides) : bytes;
+  const widths = strides.split(" ").filter(Boolean).map(Number);
+  return (widths.length > 0 ? turnedBack(bytes, widths) : bytes).buffer;
 }
 
 async function start() {
+  const module = await unpacked(document.getElementById("unpacker"));
+  unpacker = (await WebAssembly.instantiate(module)).instance.exports;
   const worker = await unpacked(document.getElementById("worker"));
   resources.worker = () =>
     new Worker(URL.createObjectURL(new Blob([worker], { type: "text/javascript" })));
@@ -63,6 +84,8 @@ async function start() {
   for (const file of document.querySelectorAll("script[data-file]")) {
     files.push([file.dataset.file, await unpacked(file)]);
   }
+  // Its memory is given back.
+  unpacker = null;
   await shown.open(scene, files);
 }
 
