@@ -113,7 +113,7 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
     for (var r = 0u; r < ROWS; r++) {
         let pixel = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5;
         var share = 0.0;
-        var weights: vec3<f32>;
+        var weights = vec3<f32>();
         if is_before {
             let to_a = place_a - pixel;
             let to_b = place_b - pixel;

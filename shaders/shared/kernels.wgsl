@@ -171,7 +171,7 @@ fn add_isotropic(f: u32, at: u32, count: u32, front: u32, first_pixel: vec2<i32>
     }
     for (var r = 0u; r < ROWS; r++) {
         let cosine2 = pixels[r].cosine * pixels[r].cosine;
-        var sum: Added;
+        var sum = Added();
         for (var i = 0u; i < TOGETHER; i++) {
             let sample = samples[i];
             let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - sample.at;
@@ -377,9 +377,9 @@ fn add_loaded(f: u32, splat: Loaded, first_pixel: vec2<i32>) {
         // The kernel at the closest approach and on the planes, −h′/r on the planes, and the
         // sections.
         var e = select(0.0, exp(-0.5 * rho2), rho2 <= splat.extent2);
-        var on_plane: vec3<f32>;
-        var steep: vec3<f32>;
-        var along: vec4<f32>;
+        var on_plane = vec3<f32>();
+        var steep = vec3<f32>();
+        var along = vec4<f32>();
         if is_table {
             let rho = sqrt(rho2);
             let half = kernel_integral(f, rho, 3e38);
@@ -446,7 +446,7 @@ fn add_loaded(f: u32, splat: Loaded, first_pixel: vec2<i32>) {
             steep *= splat.weight;
             let nearest = cross(v, beta) * (inverse * inverse);
             let unit = beta * inverse;
-            var added: Added;
+            var added = Added();
             added.weight = section;
             added.value = section * splat.strength;
             if SLOPES {

@@ -278,14 +278,14 @@ fn pass_piece(
         if MAXIMUM {
             (*medium).peak = max((*medium).peak, max(value, next));
         } else {
-            var classified: vec4<f32>;
+            var classified = vec4<f32>();
             if POST {
                 classified = classify(f, field.value);
                 classified = vec4(classified.xyz * classified.w, classified.w);
             } else {
                 classified = classify_between(f, value, next);
             }
-            var normal: vec3<f32>;
+            var normal = vec3<f32>();
             if GRADIENT_OPACITY {
                 normal = gradient_at(r, f, *medium, 0.5 * (place + next_place));
                 classified *= gradient_factor(f, length(normal));

@@ -70,3 +70,42 @@ pub const NO_LABELS: &str = include_str!("../../../shaders/shared/no_labels.wgsl
 pub const FIELD_LATTICE: &str = include_str!("../../../shaders/shared/field_lattice.wgsl");
 pub const MARCH_LATTICE: &str = include_str!("../../../shaders/shared/march_lattice.wgsl");
 pub const PICTURE: &str = include_str!("../../../shaders/shared/picture.wgsl");
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    /// Returns the lines that declare variables inside the blocks of a function without values.
+    fn without_values(text: &str) -> Vec<&str> {
+        let mut depth = 0usize;
+        let mut found = Vec::new();
+        for line in text.lines() {
+            let code = line.split("//").next().unwrap_or("").trim();
+            if depth > 1 && code.starts_with("var ") && code.ends_with(';') && !code.contains('=') {
+                found.push(code);
+            }
+            depth += code.matches('{').count();
+            depth = depth.saturating_sub(code.matches('}').count());
+        }
+        found
+    }
+
+    /// In Chromium 148, a variable without a value keeps the one of the last turn of its loop.
+    #[test]
+    fn variables_in_loops_have_values() {
+        let function =
+            "fn f() {\n    var a: f32;\n    loop {\n        var b: vec3<f32>; // c\n    }\n}";
+        assert_eq!(without_values(function), ["var b: vec3<f32>;"]);
+        let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+        let mut files = 0;
+        for folder in ["passes", "sources", "shared"] {
+            for entry in fs::read_dir(shaders.join(folder)).expect("a folder") {
+                let path = entry.expect("a file").path();
+                let text = fs::read_to_string(&path).expect("a shader");
+                assert_eq!(without_values(&text), [""; 0], "{}", path.display());
+                files += 1;
+            }
+        }
+        assert!(files > 60, "{files}");
+    }
+}

@@ -120,6 +120,8 @@ pub struct BrickCache {
     pub item: usize,
     /// Bricks read so far.
     pub reads: u64,
+    /// Whether bricks of the last update, of a file in parts, have not come yet.
+    is_missing: bool,
     /// What the lists on the GPU show; `None` if that is not certain.
     drawn: Option<Drawn>,
     /// The last choice that exceeded a picture, the picture's limit in batches of candidates, and
@@ -144,6 +146,7 @@ impl BrickCache {
             kernel: kernel.clone(),
             item,
             reads: 0,
+            is_missing: false,
             drawn: None,
             fitting: None,
             slots: Vec::new(),
@@ -165,9 +168,9 @@ impl BrickCache {
         self.drawn.as_ref() == Some(&Drawn::of(choice))
     }
 
-    /// Records that the lists on the GPU are those of this choice.
+    /// Records that the lists on the GPU are those of this choice, if all its bricks are there.
     pub fn set_drawn(&mut self, choice: &Choice) {
-        self.drawn = Some(Drawn::of(choice));
+        self.drawn = (!self.is_missing).then(|| Drawn::of(choice));
     }
 
     /// Returns the maximum number of bricks of a choice that show at most `runs` batches of
@@ -185,7 +188,7 @@ impl BrickCache {
     /// Brings the bricks of a choice to the GPU, within `room` bytes. Returns the slots that were
     /// added for them.
     pub fn update(&mut self, gpu: &Gpu, choice: &Choice, room: u64) -> Result<Vec<Slots>> {
-        self.drawn = None;
+        (self.drawn, self.is_missing) = (None, false);
         self.update += 1;
         let mut absent = Vec::new();
         // The nearest bricks are read first.
@@ -237,8 +240,10 @@ impl BrickCache {
         let mut places = places.into_iter();
         let bytes = self.bricks.brick_bytes();
         for batch in absent.chunks(BATCH) {
-            let read = self.bricks.read_all(batch)?;
-            for ((&key, brick), slot) in batch.iter().zip(read).zip(&mut places) {
+            let read = self.bricks.read_there(batch)?;
+            self.is_missing |= read.iter().any(Option::is_none);
+            let read = batch.iter().zip(read).filter_map(|(key, brick)| Some((*key, brick?)));
+            for ((key, brick), slot) in read.zip(&mut places) {
                 if let Some((old, _)) = self.slots[slot].replace((key, self.update)) {
                     self.slot_of.remove(&old);
                 }

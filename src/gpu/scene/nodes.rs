@@ -244,6 +244,7 @@ impl PageCache {
         self.set_cut(gpu, cut);
         let mut needed = self.needed(cut)?;
         let most = self.fit(&mut needed, usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX));
+        let order: Vec<u32> = needed.iter().map(|request| request.page).collect();
         let absent: Vec<Needed> =
             needed.into_iter().filter(|request| !self.table.need(request.page)).collect();
         self.recolor(gpu, eye, chunks);
@@ -261,7 +262,8 @@ impl PageCache {
             .copied()
             .chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats)))
             .collect();
-        if let Err(error) = self.load(gpu, &absent, eye, &all) {
+        let loaded = self.load(gpu, &absent, eye, &all).and_then(|()| self.leave_out(order));
+        if let Err(error) = loaded {
             self.table.shrink(held);
             return Err(error);
         }
@@ -323,8 +325,9 @@ impl PageCache {
     ) -> Result<()> {
         for batch in absent.chunks(BATCH) {
             let numbers: Vec<u32> = batch.iter().map(|request| request.page).collect();
-            let pages: Vec<Page> = self.hierarchy.read_pages(&numbers)?;
+            let pages = self.hierarchy.read_there(&numbers)?;
             for (&request, content) in batch.iter().zip(&pages) {
+                let Some(content) = content else { continue };
                 let Some(slots) = self.table.place(request) else {
                     self.missing += 1;
                     continue;
@@ -344,6 +347,17 @@ impl PageCache {
             // Writes wait in staging memory until the next submission.
             gpu.queue.submit([]);
         }
+        Ok(())
+    }
+
+    /// Of a file in parts, leaves pages out of the frame whose parents have not come yet: a page
+    /// is drawn in place of its parents. `order` are the needed pages, coarse ones first.
+    fn leave_out(&mut self, order: Vec<u32>) -> Result<()> {
+        if !self.hierarchy.is_in_parts() {
+            return Ok(());
+        }
+        let closed = self.hierarchy.closed(order, |page| self.table.holds(page))?;
+        self.table.keep_needed(&closed.into_iter().collect());
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 //! nodes need, anywhere: every node decides for itself whether it is drawn.
 
 use crate::hierarchy::needed::Needed;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Nodes of a slot (`SLOT_NODES` in nodes.wgsl). Most pages that refine a block first have no more.
 pub const SLOT_NODES: u32 = 512;
@@ -74,6 +74,20 @@ impl SlotTable {
         let Some(placed) = self.pages.get_mut(&page) else { return false };
         placed.last_needed = self.frame;
         true
+    }
+
+    /// Returns whether a page has slots.
+    pub fn holds(&self, page: u32) -> bool {
+        self.pages.contains_key(&page)
+    }
+
+    /// Of the pages that the frame needs, only these remain needed.
+    pub fn keep_needed(&mut self, pages: &HashSet<u32>) {
+        for (page, placed) in &mut self.pages {
+            if placed.last_needed == self.frame && !pages.contains(page) {
+                placed.last_needed = self.frame.saturating_sub(1);
+            }
+        }
     }
 
     /// Drops the pages that have been unused for longest until `wanted` slots are free, or until
@@ -169,6 +183,12 @@ mod tests {
         assert_eq!(table.make_room(1), [8]);
         assert_eq!(table.place(Needed { page: 9, nodes: 1 }), Some(vec![8]));
         assert_eq!(table.free(), 1);
+
+        // A page that is left out of the frame keeps its slots.
+        assert_eq!(table.needed().count(), 2);
+        table.keep_needed(&HashSet::from([7]));
+        assert_eq!(table.needed().collect::<Vec<_>>(), [7]);
+        assert!(table.holds(9) && table.parts(8, 2).next().is_none());
 
         // The page that has been unused for longest goes first.
         table.begin();

@@ -3,6 +3,8 @@
 use super::Description;
 use crate::{
     Device, Error, Renderer, Result, bricks,
+    compare::compare_pictures,
+    gpu::{AdapterChoice, Budget, Gpu},
     hierarchy::{
         file::{WriteOptions, to_bytes},
         testing::{joined, surface},
@@ -44,9 +46,14 @@ fn volume() -> (&'static str, Vec<u8>) {
 
 /// A scene of one file, close enough that the view needs only a part of it.
 fn scene(name: &str, more: &str) -> Description {
+    scene_of(name, [160, 120], more)
+}
+
+fn scene_of(name: &str, size: [u32; 2], more: &str) -> Description {
+    let size = format!("{size:?}");
     let text = format!(
         r#"{{"splatkit_scene": 2, "inputs": [{{"file": "{name}"}}], "framing": {{"zoom": 2}},
-            "picture": {{"size": [160, 120], "samples": 1 {more}}}}}"#
+            "picture": {{"samples": 1, "size": {size} {more}}}}}"#
     );
     Description::parse(&text).expect("a scene")
 }
@@ -117,6 +124,10 @@ fn read(scene: &Description, parts: &Parts) -> Result<(Loaded, Drawing)> {
 
 /// Draws a scene as its parts come, until the picture is exact.
 fn shown(scene: &Description, server: &mut Server) -> Result<Shown> {
+    shown_on(&Device::Cpu, scene, server)
+}
+
+fn shown_on(device: &Device, scene: &Description, server: &mut Server) -> Result<Shown> {
     let parts = server.parts.clone();
     let (mut first, mut rough, mut most) = (None, 0, 0);
     for _ in 0..500 {
@@ -135,7 +146,7 @@ fn shown(scene: &Description, server: &mut Server) -> Result<Shown> {
         }
         let is_rough = parts.lacks();
         let camera = scene.framing()?.camera(&loaded.subject, drawing.free(0))?;
-        let mut renderer = Renderer::new(&Device::Cpu, &loaded.scene)?;
+        let mut renderer = Renderer::new(device, &loaded.scene)?;
         for _ in 0..500 {
             let last = renderer.render(&camera, &drawing.settings)?.0;
             first.get_or_insert(server.sent);
@@ -157,13 +168,17 @@ fn shown(scene: &Description, server: &mut Server) -> Result<Shown> {
 
 /// The picture of the whole file.
 fn whole(scene: &Description, bytes: &[u8]) -> Picture {
+    whole_on(&Device::Cpu, scene, bytes)
+}
+
+fn whole_on(device: &Device, scene: &Description, bytes: &[u8]) -> Picture {
     let files = BTreeMap::from([(scene.inputs[0].file.clone(), bytes.to_vec())]);
     let mut loaded = scene.load_held(&files, &|_| {}).expect("a scene");
     let drawing = loaded.drawing(&scene.picture).expect("settings");
     let framing = scene.framing().expect("a framing");
     loaded.find_seen(&framing, &drawing.settings).expect("what is seen");
     let camera = framing.camera(&loaded.subject, drawing.free(0)).expect("a camera");
-    let mut renderer = Renderer::new(&Device::Cpu, &loaded.scene).expect("a renderer");
+    let mut renderer = Renderer::new(device, &loaded.scene).expect("a renderer");
     renderer.render(&camera, &drawing.settings).expect("a picture").0
 }
 
@@ -199,6 +214,22 @@ fn comes_to_the_whole((name, bytes): (&str, &[u8]), more: &str, most: u64) -> Re
     match is_fine && is_same(&shown.last, &whole(&scene, bytes)) {
         true => Ok(()),
         false => Err(told),
+    }
+}
+
+/// A GPU holds pages and bricks from picture to picture, and those that come later lie elsewhere.
+#[test]
+fn a_gpu_comes_to_the_picture_of_the_whole_file() {
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("an adapter");
+    let device = Device::Gpu(gpu, Budget::default());
+    for ((name, bytes), most) in [(hierarchy(), 1 << 20), (volume(), 1 << 23)] {
+        let scene = scene_of(name, [80, 60], "");
+        let mut server = Server::new(&bytes, most);
+        let shown = shown_on(&device, &scene, &mut server).expect("a picture");
+        assert!(shown.rough >= 1 && shown.first < shown.all, "{name}");
+        let whole = whole_on(&device, &scene, &bytes);
+        let difference = compare_pictures(&shown.last, &whole).expect("one size");
+        assert!(difference.psnr.is_none_or(|psnr| psnr > 80.0), "{name}: {difference:?}");
     }
 }
 

@@ -137,7 +137,6 @@ function sayFetched() {
 
 /** Returns why the CPU engine draws before WebGPU was asked, or nothing. */
 function withoutGpu(wanted) {
-  if (ranges) return "WebGPU does not draw files in parts yet.";
   if (wanted === "cpu") return "The page asks for the CPU engine.";
   if (!isSecureContext) return "Browsers have WebGPU only for pages by https, of this machine or in files.";
   return navigator.gpu ? "" : "This browser has no WebGPU.";

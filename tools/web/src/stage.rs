@@ -14,7 +14,7 @@ use splatkit::{
     interaction::{Effort, Orbit, Pace, Probe},
     math::{Camera, View},
     picture::Picture,
-    scene::{Item, Scene, Settings},
+    scene::{Scene, Settings},
     session::{CameraEntry, ClipEntry, Description, Drawing, Loaded, Side},
     volume::TransferFunction,
 };
@@ -601,17 +601,12 @@ impl Stage {
 
 /// Prepares a scene on a device, or on the processor if a GPU refuses. Returns what it says then.
 fn painter_on(device: &Device, scene: &Scene) -> Result<(Painter, Option<String>)> {
-    let is_gpu = !matches!(device, Device::Cpu);
-    let has_bricks = scene.items.iter().any(|item| matches!(item, Item::Bricks(..)));
-    let refusal = if is_gpu && has_bricks {
-        "WebGPU does not draw volumes in bricks yet.".to_owned()
-    } else {
-        match Painter::new(device, scene) {
-            Err(error) if is_gpu => error.to_string(),
-            done => return Ok((done?, None)),
+    match Painter::new(device, scene) {
+        Err(error) if !matches!(device, Device::Cpu) => {
+            Ok((Painter::new(&Device::Cpu, scene)?, Some(error.to_string())))
         }
-    };
-    Ok((Painter::new(&Device::Cpu, scene)?, Some(refusal)))
+        done => Ok((done?, None)),
+    }
 }
 
 /// Reads the inputs of a scene, and finds what is seen of it.
