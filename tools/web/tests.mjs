@@ -212,6 +212,101 @@ async function losingServed(look) {
   return served(at("lost"));
 }
 
+/** Serves a published scene, whose worker believes in so many cores. `more` comes before it. */
+async function servedWithCores(name, cores, more = "") {
+  const folder = at(`cores-${name}-${cores}`);
+  fs.rmSync(folder, { recursive: true, force: true });
+  fs.mkdirSync(folder);
+  const believes = `Object.defineProperty(navigator, "hardwareConcurrency", { value: ${cores} });\n${more}\n`;
+  fs.writeFileSync(path.join(folder, "splatkit-worker.js"), believes + fs.readFileSync(path.join(viewer, "splatkit-worker.js"), "utf8"));
+  return served([folder, at(`cores-${name}`)]);
+}
+
+const median = (numbers) => numbers.toSorted((a, b) => a - b)[numbers.length >> 1];
+
+/** Draws the exact picture some times, and turns the scene. Returns the times of frames. */
+async function timed(page, workers) {
+  const again = () => page.evaluate(() => { const one = document.querySelector("splatkit-viewer"); one.camera = one.camera; });
+  const exact = [];
+  for (let turn = 0; exact.length < 5 && turn < 40; turn++) {
+    await again();
+    const frames = ended(await rested(page));
+    if (frames.at(-1).workers === workers) exact.push(frames.at(-1).milliseconds);
+    else await page.waitForTimeout(500);
+  }
+  assert.equal(exact.length, 5, `${workers} workers draw`);
+  const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
+  await page.mouse.move(320, 240);
+  await page.mouse.down();
+  for (let step = 1; step <= 60; step++) {
+    await page.mouse.move(320 + 4 * step, 240 + step);
+    await page.waitForTimeout(30);
+  }
+  await page.mouse.up();
+  // The first ones find the pace.
+  const moving = ended(await rested(page)).filter(({ width }) => width < SIZE[0]).slice(5);
+  await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), camera);
+  ended(await rested(page));
+  const [time, width] = ["milliseconds", "width"].map((what) => Math.round(median(moving.map((frame) => frame[what]))));
+  return `${Math.round(median(exact))} ms exact, ${time} ms moving at ${width} pixels`;
+}
+
+for (const name of ["mesh", "volume", "mixed"]) {
+  tests[`${name} by several workers`] = async () => {
+    const look = [...CASES[name], "--background", "#10141c"];
+    fs.rmSync(at(`cores-${name}`), { recursive: true, force: true });
+    run("publish", ...look, "-o", `cores-${name}`, "--viewer", viewer);
+    const said = [];
+    // Four are more than some machines have: their picture is the same.
+    for (const workers of name === "volume" ? [1, 2, 4] : [1, 2]) {
+      const server = await servedWithCores(name, workers);
+      const page = await opened(server.address);
+      ended(await rested(page));
+      said.push(`${workers}: ${await timed(page, workers)}`);
+      await saved(page, `cores-${name}-${workers}.png`);
+      // Byte for byte.
+      assert.equal(likeness(`cores-${name}-1.png`, `cores-${name}-${workers}.png`), Infinity);
+      assert.deepEqual(page.faults.filter((fault) => !fault.includes("favicon")), []);
+      assert.equal(page.workers().length, workers);
+      await page.evaluate(() => document.querySelector("splatkit-viewer").close());
+      await page.waitForTimeout(200);
+      assert.equal(page.workers().length, 0, "all workers are ended");
+      await page.context().close();
+      server.close();
+    }
+    return said.join("; ");
+  };
+}
+
+tests["a helper that fails"] = async () => {
+  const look = [...CASES.volume, "--background", "#10141c"];
+  fs.rmSync(at("cores-failing"), { recursive: true, force: true });
+  run("publish", ...look, "-o", "cores-failing", "--viewer", viewer);
+  const said = [];
+  // While it opens the scene, while it draws, and without a word.
+  const faults = {
+    opening: `addEventListener("message", ({ data }) => data.type === "help" && (WebAssembly.Instance = class { constructor() { throw new Error("no"); } }));`,
+    drawing: `addEventListener("message", ({ data }) => data.type === "help" && setTimeout(() => (viewer.help = () => { throw new WebAssembly.RuntimeError("no"); }), 1500));`,
+    silent: `addEventListener("message", ({ data }) => data.type === "help" && setTimeout(() => (viewer.help = () => { for (;;); }), 1500));`,
+  };
+  for (const [when, more] of Object.entries(faults)) {
+    const server = await servedWithCores("failing", 2, more);
+    const page = await opened(server.address);
+    ended(await rested(page));
+    await page.waitForTimeout(2500);
+    await page.evaluate(() => { const one = document.querySelector("splatkit-viewer"); one.camera = one.camera; });
+    const frames = ended(await rested(page));
+    assert.equal(frames.at(-1).workers, 1, when);
+    await saved(page, `cores-failing-${when}.png`);
+    if (said.length > 0) assert.equal(likeness(`cores-failing-${when}.png`, "cores-failing-opening.png"), Infinity);
+    assert.deepEqual(page.faults.filter((fault) => !fault.includes("favicon")), []);
+    said.push(when);
+    await page.context().close();
+    server.close();
+  }
+  return said.join(", ");
+};
+
 tests["a lost device"] = async () => {
   const look = [...CASES.cloud, "--background", "#10141c"];
   const server = await losingServed(look);

@@ -33,7 +33,7 @@ export interface Engine {
 /** The details of the element's events. */
 export interface SplatkitViewerEventMap {
   load: CustomEvent<{ summary: string; warnings: string[] } & Engine>;
-  frame: CustomEvent<{ width: number; height: number; isExact: boolean; milliseconds: number } & Engine>;
+  frame: CustomEvent<{ width: number; height: number; isExact: boolean; milliseconds: number; workers: number } & Engine>;
   rest: CustomEvent<Record<string, never>>;
   camerachange: CustomEvent<{ camera: Camera }>;
   fetched: CustomEvent<{ requests: number; bytes: number; cancelled: number; isBusy: boolean }>;

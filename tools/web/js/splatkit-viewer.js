@@ -92,6 +92,8 @@ export class SplatkitViewer extends HTMLElement {
   static observedAttributes = ["src", "camera", "transfer", "clips", "label", "pixel-ratio"];
 
   #worker = null;
+  /** Workers that draw along. */
+  #helpers = [];
   #canvas;
   #context;
   #status;
@@ -243,6 +245,7 @@ export class SplatkitViewer extends HTMLElement {
    *  [name, address] for hierarchies and bricks, which are read in parts. */
   async open(scene, files) {
     const opening = ++this.#opening;
+    this.#endHelpers();
     this.#say("Loading…");
     this.#problem.hidden = true;
     try {
@@ -265,6 +268,31 @@ export class SplatkitViewer extends HTMLElement {
     }
   }
 
+  /** Starts workers that draw along with the worker of the scene, which hears of each. */
+  async #startHelpers({ count, opening }) {
+    this.#endHelpers();
+    const [worker, helpers] = [this.#worker, this.#helpers];
+    try {
+      for (let number = 0; number < count; number++) {
+        const helper = await resources.worker();
+        if (worker !== this.#worker || helpers !== this.#helpers) return helper.terminate();
+        helpers.push(helper);
+        const { port1, port2 } = new MessageChannel();
+        // A helper that says nothing is not waited for.
+        helper.onerror = (event) => event.preventDefault();
+        helper.postMessage({ type: "help", port: port2 }, [port2]);
+        worker.postMessage({ type: "helper", port: port1, opening }, [port1]);
+      }
+    } catch {
+      // The scene's worker draws alone.
+    }
+  }
+
+  #endHelpers() {
+    for (const helper of this.#helpers) helper.terminate();
+    this.#helpers = [];
+  }
+
   /** Says in the page what went wrong, and ends the worker. */
   complain(message) {
     this.#complain(message, true);
@@ -275,6 +303,7 @@ export class SplatkitViewer extends HTMLElement {
     this.#opening++;
     this.#worker?.terminate();
     this.#worker = null;
+    this.#endHelpers();
     this.#isOpen = false;
     this.#isFetching = false;
   }
@@ -323,6 +352,7 @@ export class SplatkitViewer extends HTMLElement {
       this.#questions.delete(message.id);
     }
     if (message.type === "rest") this.#tell("rest");
+    if (message.type === "helpers") this.#startHelpers(message);
     if (message.type === "fetched") this.#hearFetched(message);
     if (message.type === "transfers") this.#transfers = JSON.parse(message.transfers);
     if (message.type === "error") this.#complain(message.message, message.isFatal);
@@ -350,7 +380,7 @@ export class SplatkitViewer extends HTMLElement {
     this.#drawnBy.textContent = engine === "webgpu" ? "WebGPU" : `the processor. ${reason}`;
   }
 
-  #show({ width, height, isExact, milliseconds, camera, buffer, engine, reason }) {
+  #show({ width, height, isExact, milliseconds, camera, buffer, engine, reason, workers }) {
     const pixels = new ImageData(new Uint8ClampedArray(buffer), width, height);
     const [wide, high] = this.#size;
     if (this.#canvas.width !== wide || this.#canvas.height !== high) {
@@ -368,7 +398,7 @@ export class SplatkitViewer extends HTMLElement {
     this.#cameraText = camera;
     this.#camera = JSON.parse(camera);
     this.#sayEngine(engine, reason);
-    this.#tell("frame", { width, height, isExact, milliseconds, engine, reason });
+    this.#tell("frame", { width, height, isExact, milliseconds, engine, reason, workers });
     if (isMoved) this.#tell("camerachange", { camera: this.camera });
   }
 

@@ -23,6 +23,13 @@ let isScheduled = false;
 let isResting = true;
 /** Pointers move more often than frames are drawn: drags are summed up until the next one. */
 let drags = new Map();
+/** The engine, compiled, and what it holds in memory. */
+let compiled = null;
+let memory = null;
+/** What the scene was opened with: its text, its files and the size of its picture. */
+let opened = null;
+/** What draws bands of the frames beside this worker. */
+let helpers = null;
 const pulse = new MessageChannel();
 pulse.port1.onmessage = () => {
   isScheduled = false;
@@ -45,6 +52,7 @@ function complain(error) {
   if (isTrap) {
     viewer = null;
     ranges?.close();
+    helpers?.close();
   }
   postMessage({ type: "error", message: text, isFatal: isTrap || !viewer });
 }
@@ -72,6 +80,129 @@ function hearEngine() {
   hint(`The processor draws from now on, because WebGPU failed: ${drawn.reason}`);
 }
 
+/** The most helpers, and the most bytes of their memory, as far as is known. */
+const MOST_HELPERS = 4;
+const HELPERS_BYTES = 256 * 2 ** 20;
+/** The bytes for helpers for each GiB of the machine. */
+const SHARE = 64 * 2 ** 20;
+/** The milliseconds that a band may take at most. */
+const LONG = 20_000;
+
+/** Returns how many helpers may draw along, if each takes as much memory as this worker. */
+function wantedHelpers() {
+  const most = Math.min(HELPERS_BYTES, (navigator.deviceMemory ?? Infinity) * SHARE);
+  const cores = (navigator.hardwareConcurrency ?? 1) - 1;
+  return Math.max(0, Math.min(MOST_HELPERS, cores, Math.floor(most / memory.buffer.byteLength)));
+}
+
+/** Other workers with the same scene, which draw bands of its frames. The page starts them. */
+class Helpers {
+  /** Each has a port, and what it draws: the numbers of the frame and of the band. */
+  #all = [];
+  #timer = null;
+  isClosed = false;
+
+  constructor() {
+    const count = wantedHelpers();
+    if (count > 0) postMessage({ type: "helpers", count, opening });
+  }
+
+  /** A helper has come. It opens the scene. */
+  add(port) {
+    const one = { port, isReady: false, draws: null };
+    this.#all.push(one);
+    port.onmessage = ({ data }) => {
+      if (this.#all.includes(one)) this.#hear(one, data);
+    };
+    const { scene, held, width, height } = opened;
+    const files = held.names().map((name) => [name, held.bytes(name).buffer]);
+    port.postMessage({ module: compiled, scene, files, width, height }, files.map(([, buffer]) => buffer));
+  }
+
+  #hear(one, { failed, frame, band, numbers }) {
+    try {
+      if (failed) return this.#drop(one);
+      one.isReady = true;
+      one.draws = null;
+      if (numbers) viewer.give_back(frame, band, numbers);
+      else viewer.set_helpers(this.count);
+      this.lend();
+      schedule();
+    } catch (error) {
+      complain(error);
+    }
+  }
+
+  /** How many draw along. */
+  get count() {
+    return this.#all.filter(({ isReady }) => isReady).length;
+  }
+
+  /** Gives bands of the frame to those that draw nothing. */
+  lend() {
+    for (const one of this.#all) {
+      if (!one.isReady || one.draws) continue;
+      const job = viewer.lend();
+      if (!job) break;
+      const { frame, band } = JSON.parse(job);
+      one.draws = { frame, band, since: performance.now() };
+      one.port.postMessage({ job });
+    }
+  }
+
+  /** Waits for a helper, but not for ever. */
+  watch() {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => {
+      if (!viewer || this.isClosed) return;
+      const late = this.#all.filter(({ draws }) => draws && performance.now() - draws.since >= LONG);
+      for (const one of late) this.#drop(one);
+      schedule();
+    }, LONG + 100);
+  }
+
+  /** Goes on without a helper: others draw what it was to draw. */
+  #drop(one) {
+    this.#all.splice(this.#all.indexOf(one), 1);
+    one.port.close();
+    viewer.set_helpers(this.count);
+    if (one.draws) viewer.take_back(one.draws.frame, one.draws.band);
+    schedule();
+  }
+
+  /** All helpers have failed, or are no longer needed. */
+  close() {
+    this.isClosed = true;
+    clearTimeout(this.#timer);
+    for (const { port } of this.#all) port.close();
+    this.#all = [];
+  }
+}
+
+/** Draws bands for another worker. */
+function help(port) {
+  const say = (message, moved = []) => port.postMessage(message, moved);
+  port.onmessage = ({ data }) => {
+    try {
+      if (data.module) {
+        initSync({ module: data.module });
+        const held = new Files();
+        if (navigator.deviceMemory) held.set_machine(navigator.deviceMemory);
+        for (const [name, file] of data.files) held.add(name, new Uint8Array(file));
+        viewer = new Viewer(data.scene, held, Engine.cpu(), data.width, data.height);
+        say({});
+        return;
+      }
+      const { frame, band } = JSON.parse(data.job);
+      const numbers = viewer.help(data.job);
+      say({ frame, band, numbers }, [numbers.buffer]);
+    } catch {
+      say({ failed: true });
+      close();
+    }
+  };
+}
+
 function applyDrags() {
   for (const [name, [x, y]] of drags) viewer[name](x, y);
   drags.clear();
@@ -83,6 +214,7 @@ function work() {
     applyDrags();
     const wait = viewer.step();
     hearEngine();
+    helpers?.lend();
     if (wait === -1) {
       if (!isResting) postMessage({ type: "rest" });
       isResting = true;
@@ -90,13 +222,16 @@ function work() {
     }
     isResting = false;
     if (wait === -2) showFrame();
+    if (wait === -2) sayFull();
     if (wait === -2 || wait === -3) fetchMore();
     if (wait === -4) listen();
+    if (wait === -5) helpers.watch();
+    if (wait === -2 && !helpers && !ranges && drawn.engine === "cpu") helpers = new Helpers();
     if (isRough && !viewer.is_rough()) {
       isRough = false;
       postMessage({ type: "transfers", transfers: viewer.transfers() });
     }
-    // At −3, what comes wakes this, and at −4 the GPU.
+    // At −3, what comes wakes this, at −4 the GPU, and at −5 a helper.
     if (wait > -3) schedule(Math.max(wait, 0));
   } catch (error) {
     complain(error);
@@ -108,7 +243,7 @@ function showFrame() {
   const { buffer } = viewer.pixels();
   const camera = viewer.camera();
   postMessage(
-    { type: "frame", width, height, isExact: exact === 1, milliseconds, camera, buffer, ...drawn },
+    { type: "frame", width, height, isExact: exact === 1, milliseconds, camera, buffer, workers: 1 + (helpers?.count ?? 0), ...drawn },
     [buffer],
   );
 }
@@ -120,8 +255,11 @@ function hint(message) {
 
 /** Fetches what the last frame lacks, and gives up the rest. */
 function fetchMore() {
-  if (!ranges) return;
-  ranges.want(viewer.requests());
+  if (ranges) ranges.want(viewer.requests());
+}
+
+/** Says if the view needs more than fits. */
+function sayFull() {
   const before = isFull;
   isFull = viewer.is_full();
   if (isFull && !before) {
@@ -182,11 +320,15 @@ async function made(scene, held, engine, size) {
 async function open({ scene, files, engine, width, height }) {
   const mine = ++opening;
   ranges?.close();
+  helpers?.close();
+  helpers = null;
   viewer?.free();
   viewer = null;
   isFull = false;
   drags.clear();
   const held = new Files();
+  // Browsers that tell it round it, and tell of at most some GiB.
+  if (navigator.deviceMemory) held.set_machine(navigator.deviceMemory);
   const fetching = new Ranges({ arrive() {}, problem: hint, idle() {} });
   ranges = files.some(([, file]) => typeof file === "string") ? fetching : null;
   for (const [name, file] of files) {
@@ -202,6 +344,7 @@ async function open({ scene, files, engine, width, height }) {
   const [device, means] = await engineFor(engine);
   const next = await made(scene, held, device, [width, height]);
   if (mine !== opening) return next.free();
+  opened = { scene, held, width, height };
   [viewer, drawn] = [next, means];
   if (drawn.engine === "webgpu" && !viewer.is_gpu()) goOn();
   fetching.hear = {
@@ -232,9 +375,16 @@ async function open({ scene, files, engine, width, height }) {
 /** What the page may ask for, by name. */
 const answers = {
   open(message) {
-    if (message.wasm) initSync({ module: message.wasm });
+    if (message.wasm) {
+      compiled = new WebAssembly.Module(message.wasm);
+      ({ memory } = initSync({ module: compiled }));
+    }
     const mine = opening + 1;
     open(message).catch((error) => mine === opening && complain(error));
+  },
+  helper({ port, opening: for_ }) {
+    if (for_ === opening && helpers && !helpers.isClosed) helpers.add(port);
+    else port.close();
   },
   drag({ kind, x, y }) {
     const [sumX, sumY] = drags.get(kind) ?? [0, 0];
@@ -255,6 +405,7 @@ const answers = {
 
 onmessage = ({ data }) => {
   try {
+    if (data.type === "help") return help(data.port);
     if (!viewer && data.type !== "open") return;
     // What was dragged before comes before.
     if (data.type !== "drag" && viewer) applyDrags();

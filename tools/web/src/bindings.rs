@@ -1,6 +1,6 @@
 //! What JavaScript calls. Errors are texts for people.
 
-use crate::{MOST, Request, Stage, Step};
+use crate::{Request, Stage, Step};
 use glam::{DVec2, DVec3};
 use splatkit::{
     Device, Error,
@@ -25,6 +25,11 @@ impl Files {
         Self::default()
     }
 
+    /// See [`crate::Files::set_machine`].
+    pub fn set_machine(&mut self, gibibytes: f64) {
+        self.0.set_machine(gibibytes);
+    }
+
     /// Adds a file.
     pub fn add(&mut self, name: &str, bytes: Vec<u8>) {
         self.0.add(name, bytes);
@@ -32,7 +37,19 @@ impl Files {
 
     /// Adds a file of `size` bytes that comes in parts. Returns its number.
     pub fn add_parts(&mut self, name: &str, size: f64) -> usize {
-        self.0.add_parts(name, Parts::new(size as u64, MOST))
+        let parts = Parts::new(size as u64, self.0.most_of_parts());
+        self.0.add_parts(name, parts)
+    }
+
+    /// The names of the files that are there as wholes.
+    pub fn names(&self) -> Vec<String> {
+        self.0.whole().map(|(name, _)| name.to_string_lossy().into_owned()).collect()
+    }
+
+    /// The bytes of such a file.
+    pub fn bytes(&self, name: &str) -> js_sys::Uint8Array {
+        let mut named = self.0.whole().filter(|(known, _)| known.to_string_lossy() == name);
+        js_sys::Uint8Array::from(named.next().map_or(&[][..], |(_, bytes)| bytes))
     }
 
     /// Hands in bytes of a file in parts.
@@ -100,13 +117,14 @@ impl Viewer {
 
     /// Does the next part of the work. Returns the milliseconds to wait before the next one.
     /// −1: nothing is left to do. −2: there is a new frame. −3: parts have to come first. −4: a GPU
-    /// draws.
+    /// draws. −5: helpers draw.
     pub fn step(&mut self) -> Result<f64, JsError> {
         Ok(match self.0.step().map_err(|error| told(&error))? {
             Step::Rests => -1.0,
             Step::Shows => -2.0,
             Step::Lacks => -3.0,
             Step::Draws => -4.0,
+            Step::Lent => -5.0,
             Step::Works => 0.0,
             Step::Waits(milliseconds) => milliseconds,
         })
@@ -150,6 +168,31 @@ impl Viewer {
     /// See [`Stage::is_full`].
     pub fn is_full(&self) -> bool {
         self.0.is_full()
+    }
+
+    /// See [`Stage::set_helpers`].
+    pub fn set_helpers(&mut self, count: u32) {
+        self.0.set_helpers(count);
+    }
+
+    /// See [`Stage::lend`].
+    pub fn lend(&mut self) -> Option<String> {
+        self.0.lend()
+    }
+
+    /// See [`Stage::give_back`].
+    pub fn give_back(&mut self, frame: f64, band: usize, numbers: &[f32]) -> Result<(), JsError> {
+        self.0.give_back(frame as u64, band, numbers).map_err(|error| told(&error))
+    }
+
+    /// See [`Stage::take_back`].
+    pub fn take_back(&mut self, frame: f64, band: usize) {
+        self.0.take_back(frame as u64, band);
+    }
+
+    /// See [`Stage::help`].
+    pub fn help(&mut self, job: &str) -> Result<Vec<f32>, JsError> {
+        self.0.help(job).map_err(|error| told(&error))
     }
 
     /// The pixels of the last frame: red, green, blue and opacity.

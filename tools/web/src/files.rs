@@ -5,22 +5,49 @@ use splatkit::{
     input::Parts,
     session::{Description, Loaded},
 };
-use std::{collections::BTreeMap, ops::Range, path::PathBuf, rc::Rc};
+use std::{
+    collections::BTreeMap,
+    ops::Range,
+    path::{Path, PathBuf},
+    rc::Rc,
+};
 
 /// Most bytes of a file in parts that are held in memory.
 pub const MOST: u64 = 256 << 20;
+
+/// Bytes of a file in parts, and of what is made of files for drawing, for each GiB of a small
+/// machine.
+const PARTS_OF_GIB: f64 = (64 << 20) as f64;
+const PAGES_OF_GIB: f64 = (160 << 20) as f64;
 
 /// The files of a scene, by the names that the scene file gives them. Clones share them.
 #[derive(Debug, Clone, Default)]
 pub struct Files {
     whole: Rc<BTreeMap<PathBuf, Vec<u8>>>,
     in_parts: Vec<(PathBuf, Parts)>,
+    /// The GiB of the machine, if it has told.
+    machine: Option<f64>,
 }
 
 /// A range of bytes of a file in parts, which has this number.
 pub type Request = (usize, Range<u64>);
 
 impl Files {
+    /// Says how many GiB of memory the machine has.
+    pub fn set_machine(&mut self, gibibytes: f64) {
+        self.machine = Some(gibibytes).filter(|size| *size > 0.0);
+    }
+
+    /// Returns the most bytes of a file in parts that are held.
+    pub fn most_of_parts(&self) -> u64 {
+        self.machine.map_or(MOST, |size| MOST.min((size * PARTS_OF_GIB) as u64))
+    }
+
+    /// Returns the most bytes of the pages and bricks for drawing, if `usual` are usual.
+    pub fn most_of_pages(&self, usual: u64) -> u64 {
+        self.machine.map_or(usual, |size| usual.min((size * PAGES_OF_GIB) as u64))
+    }
+
     /// Adds a file as a whole.
     pub fn add(&mut self, name: impl Into<PathBuf>, bytes: Vec<u8>) {
         Rc::make_mut(&mut self.whole).insert(name.into(), bytes);
@@ -30,6 +57,11 @@ impl Files {
     pub fn add_parts(&mut self, name: impl Into<PathBuf>, parts: Parts) -> usize {
         self.in_parts.push((name.into(), parts));
         self.in_parts.len() - 1
+    }
+
+    /// Returns the files that are there as wholes, by their names.
+    pub fn whole(&self) -> impl Iterator<Item = (&Path, &[u8])> {
+        self.whole.iter().map(|(name, bytes)| (name.as_path(), bytes.as_slice()))
     }
 
     /// Reads the inputs of a scene.

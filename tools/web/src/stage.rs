@@ -4,9 +4,11 @@
 //! from opening the scene: fine frames are drawn in strips, and the hand is heard between them. A
 //! GPU draws whole frames meanwhile. If it cannot, the processor draws.
 
+mod bands;
 mod painter;
 
 use crate::{Files, Request};
+use bands::Bands;
 use glam::{DVec2, DVec3};
 use painter::Painter;
 use splatkit::{
@@ -14,7 +16,7 @@ use splatkit::{
     interaction::{Effort, Orbit, Pace, Probe},
     math::{Camera, View},
     picture::Picture,
-    scene::{Scene, Settings},
+    scene::{Controls, Scene, Settings},
     session::{CameraEntry, ClipEntry, Description, Drawing, Loaded, Side},
     volume::TransferFunction,
 };
@@ -54,6 +56,8 @@ pub enum Step {
     Draws,
     /// Parts of files have to come first ([`Stage::requests`]). Call again then.
     Lacks,
+    /// Helpers draw the rest of the frame. Call again when one has ([`Stage::give_back`]).
+    Lent,
 }
 
 /// A frame that was drawn.
@@ -71,6 +75,8 @@ pub struct Frame {
 
 /// A frame that is being drawn.
 struct Work {
+    /// Its number among the frames.
+    number: u64,
     effort: Effort,
     /// Whether the view moves. A frame of a moving view is finished, even if it has moved on.
     moves: bool,
@@ -80,9 +86,9 @@ struct Work {
     view: View,
     start: Instant,
     picture: Picture,
-    /// The rows that are drawn, and those of a strip.
-    done: u32,
-    rows: u32,
+    bands: Bands,
+    /// What helpers must know, if some draw along.
+    state: String,
     milliseconds: f64,
 }
 
@@ -109,6 +115,13 @@ pub struct Stage {
     is_changed: bool,
     changed: Instant,
     work: Option<Work>,
+    /// The frames that were begun.
+    begun: u64,
+    /// The helpers that draw along, and whether the next frame is drawn without them.
+    helpers: u32,
+    is_alone: bool,
+    /// What another stage has set, if this one helps it.
+    taken: String,
     frame: Option<Frame>,
     /// The effort of the last frame, if parts of files were missed, and when it was finished.
     again: Option<(Effort, Instant)>,
@@ -135,6 +148,8 @@ impl Stage {
         picture.views.clear();
         (picture.columns, picture.panel_labels) = (None, None);
         picture.size = Some(size.map(|side| side.max(1)));
+        let usual = picture.memory.unwrap_or(Controls::default().page_memory);
+        picture.memory = Some(files.most_of_pages(usual));
         files.begin(&[]);
         let (loaded, drawing) = read(&description, &files)?;
         let framing = description.framing()?;
@@ -163,6 +178,10 @@ impl Stage {
             is_changed,
             changed: Instant::now(),
             work: None,
+            begun: 0,
+            helpers: 0,
+            is_alone: false,
+            taken: String::new(),
             frame: None,
             again: None,
             is_fed: false,
@@ -256,7 +275,7 @@ impl Stage {
     /// Returns whether the view needs more of a file than may be held in memory. It is shown
     /// coarser then.
     pub fn is_full(&self) -> bool {
-        self.files.are_full()
+        self.files.are_full() || self.painter.is_missing()
     }
 
     /// Returns what was said of the inputs while they were read.
@@ -337,6 +356,10 @@ impl Stage {
             Error::Argument(format!("there is no field {field}: the scene has {}", fields.len()))
         })?;
         self.loaded.scene.with_transfer(item, transfer)?;
+        if self.work.as_ref().is_some_and(|work| work.moves) && !self.painter.is_gpu() {
+            // Its other bands would have other colours. Changes may come faster than frames.
+            (self.work, self.is_alone) = (None, true);
+        }
         self.painter.set_transfer(item, transfer)?;
         self.transfers.insert(field, transfer.clone());
         self.touch();
@@ -476,7 +499,9 @@ impl Stage {
         if self.is_rough && self.is_fed && self.rough.is_empty() && self.work.is_none() {
             self.read_again()?;
         }
-        let is_new = std::mem::take(&mut self.is_changed);
+        // A moving frame is finished first.
+        let moves = self.work.as_ref().is_some_and(|work| work.moves);
+        let is_new = !moves && std::mem::take(&mut self.is_changed);
         if is_new {
             self.work = None;
             self.again = None;
@@ -493,6 +518,9 @@ impl Stage {
                 return Ok(Step::Waits((CALM - calm).as_secs_f64() * 1e3));
             }
             self.begin(effort, is_new)?;
+            if self.work.as_ref().is_some_and(|work| !work.state.is_empty()) {
+                return Ok(Step::Works);
+            }
         }
         self.draw_strip()
     }
@@ -511,13 +539,23 @@ impl Stage {
     /// Begins a frame. One that moves is drawn at once.
     fn begin(&mut self, effort: Effort, moves: bool) -> Result<()> {
         self.files.begin(&self.rough);
+        self.painter.renew();
         self.is_fed = false;
         let (exact, camera) = (&self.drawing.settings, self.orbit.camera().clone());
         let settings = effort.settings(exact, exact.sheet_thickness.or(self.sheet));
         let view = camera.view(settings.size)?;
         let picture = Picture::blank(settings.size);
         let height = settings.size[1];
+        let is_alone = std::mem::take(&mut self.is_alone) || self.painter.is_gpu();
+        let helpers = if is_alone { 0 } else { self.helpers };
+        let bands = match moves {
+            true => Bands::among(height, 1 + helpers),
+            false => Bands::new(height, strip_rows(height)),
+        };
+        let is_shared = helpers > 0 && bands.are_several();
+        self.begun += 1;
         self.work = Some(Work {
+            number: self.begun,
             effort,
             moves,
             settings,
@@ -526,8 +564,8 @@ impl Stage {
             view,
             start: Instant::now(),
             picture,
-            done: 0,
-            rows: if moves { height } else { strip_rows(height) },
+            bands,
+            state: if is_shared { self.state() } else { String::new() },
             milliseconds: 0.0,
         });
         Ok(())
@@ -561,26 +599,22 @@ impl Stage {
             return Ok(self.hear_gpu()?.unwrap_or(Step::Works));
         }
         let Some(mut work) = self.work.take() else { return Ok(Step::Rests) };
-        let [width, height] = work.settings.size;
-        let rows = work.rows.min(height - work.done);
-        let start = Instant::now();
-        if rows == height {
-            work.picture = self.painter.draw(&work.view, &work.settings)?;
-        } else {
-            let above = DVec2::new(0.0, f64::from(work.done));
-            let size = [width, rows];
-            let view = View { center: work.view.center - above, size, ..work.view.clone() };
-            let settings = Settings { size, ..work.settings.clone() };
-            let strip = self.painter.draw(&view, &settings)?;
-            work.picture.paste(&strip, [0, work.done])?;
+        if let Some(band) = work.bands.next() {
+            let (rows, start) = (work.bands.rows(band), Instant::now());
+            let drawn = bands::drawn(&mut self.painter, &work.view, &work.settings, rows.clone())?;
+            work.picture.paste(&drawn, [0, rows.start])?;
+            work.bands.set_drawn(band);
+            work.milliseconds += start.elapsed().as_secs_f64() * 1e3;
         }
-        work.milliseconds += start.elapsed().as_secs_f64() * 1e3;
-        work.done += rows;
-        if work.done < height {
-            self.work = Some(work);
-            return Ok(Step::Works);
+        if work.bands.are_drawn() {
+            if !work.state.is_empty() {
+                work.milliseconds = work.start.elapsed().as_secs_f64() * 1e3;
+            }
+            return self.finish(work);
         }
-        self.finish(work)
+        let step = if work.bands.next().is_some() { Step::Works } else { Step::Lent };
+        self.work = Some(work);
+        Ok(step)
     }
 
     /// Makes a drawn picture the frame that is shown.

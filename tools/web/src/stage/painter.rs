@@ -2,7 +2,7 @@
 //! the hand.
 
 use splatkit::{
-    Device, Renderer, Result, Stop,
+    Device, FrameStats, Renderer, Result, Stop,
     math::View,
     picture::Picture,
     scene::{Scene, Settings},
@@ -16,7 +16,7 @@ use std::{
 };
 
 /// The renderer, on loan while a GPU draws, and the picture that the GPU has drawn.
-type Drawing = Pin<Box<dyn Future<Output = (Renderer, Result<Picture>)>>>;
+type Drawing = Pin<Box<dyn Future<Output = (Renderer, Result<(Picture, FrameStats)>)>>>;
 
 /// A renderer, and the picture that a GPU draws.
 pub struct Painter {
@@ -27,6 +27,8 @@ pub struct Painter {
     /// The transfer functions of items that were set while a GPU draws.
     transfers: Vec<(usize, TransferFunction)>,
     bell: Arc<Bell>,
+    /// Whether pages that the frame needs did not find room.
+    is_missing: bool,
 }
 
 impl Painter {
@@ -38,6 +40,7 @@ impl Painter {
             drawing: None,
             transfers: Vec::new(),
             bell: Arc::default(),
+            is_missing: false,
         })
     }
 
@@ -51,12 +54,22 @@ impl Painter {
         self.drawing.is_some()
     }
 
+    /// A frame begins.
+    pub fn renew(&mut self) {
+        self.is_missing = false;
+    }
+
+    /// Returns whether pages of hierarchies that the frame needs did not find room in memory.
+    pub fn is_missing(&self) -> bool {
+        self.is_missing
+    }
+
     /// Draws at once, on the processor.
     pub fn draw(&mut self, view: &View, settings: &Settings) -> Result<Picture> {
-        match &mut self.renderer {
-            Some(renderer) => Ok(renderer.render(view, settings)?.0),
-            None => Ok(Picture::blank(settings.size)),
-        }
+        let Some(renderer) = &mut self.renderer else { return Ok(Picture::blank(settings.size)) };
+        let (picture, stats) = renderer.render(view, settings)?;
+        self.is_missing |= stats.missing_pages > 0;
+        Ok(picture)
     }
 
     /// Begins a picture on a GPU. [`poll`](Self::poll) returns it.
@@ -66,7 +79,7 @@ impl Painter {
         settings.controls.stop = stop.clone();
         let drawing = async move {
             let drawn = renderer.render_async(&view, &settings).await;
-            (renderer, drawn.map(|(picture, _)| picture))
+            (renderer, drawn)
         };
         self.drawing = Some((Box::pin(drawing), stop));
     }
@@ -93,7 +106,10 @@ impl Painter {
         drop(set);
         self.renderer = Some(renderer);
         self.drawing = None;
-        Some(all.and(drawn))
+        Some(all.and(drawn).map(|(picture, stats)| {
+            self.is_missing |= stats.missing_pages > 0;
+            picture
+        }))
     }
 
     /// Returns a future that is ready when [`poll`](Self::poll) may have more to say.

@@ -58,6 +58,7 @@ fn rest_on(stage: &mut Stage, wait: impl Fn()) -> usize {
             Step::Works => {}
             Step::Draws => wait(),
             Step::Lacks => panic!("nothing comes in parts"),
+            Step::Lent => panic!("nobody helps"),
         }
     }
 }
@@ -210,4 +211,100 @@ fn a_gpu_that_refuses_a_scene_leaves_it_to_the_processor() {
     assert!(!stage.is_gpu());
     assert!(stage.refusal().is_some_and(|why| why.contains("linear")), "{:?}", stage.refusal());
     assert!(rest(&mut stage) >= 1);
+}
+
+/// Draws until nothing is left to do, with a stage that helps. Returns the steps that waited for it.
+fn rest_helped(stage: &mut Stage, helper: &mut Stage, mut fails: impl FnMut() -> bool) -> usize {
+    let (mut waited, mut lent) = (0, None);
+    for _ in 0..500 {
+        let step = stage.step().expect("a step");
+        lent = lent.or_else(|| stage.lend());
+        let is_lent = step == Step::Lent;
+        if let (true, Some(job)) = (is_lent, lent.take_if(|_| is_lent)) {
+            waited += 1;
+            let asked: serde_json::Value = serde_json::from_str(&job).expect("JSON");
+            let [frame, band] = ["frame", "band"].map(|name| asked[name].as_u64().expect("one"));
+            if fails() {
+                stage.take_back(frame, band as usize);
+                stage.set_helpers(0);
+            } else {
+                let drawn = helper.help(&job).expect("a band");
+                stage.give_back(frame, band as usize, &drawn).expect("its numbers");
+            }
+        }
+        match step {
+            Step::Rests => return waited,
+            Step::Waits(time) => std::thread::sleep(Duration::from_secs_f64(time / 1e3)),
+            _ => {}
+        }
+    }
+    panic!("the helper is waited for in vain");
+}
+
+#[test]
+fn helpers_draw_the_same_pictures() {
+    let ((mut alone, ..), (mut stage, ..), (mut helper, ..)) = (stage(), stage(), stage());
+    stage.set_helpers(1);
+    for turn in [0.0, 7.0] {
+        let size = [96, 200];
+        alone.resize(size).expect("a size");
+        stage.resize(size).expect("a size");
+        let clip = serde_json::json!([{"side": {"axis": "x", "below": true, "at": turn / 9.0}}]);
+        let clips: Vec<ClipEntry> = serde_json::from_value(clip).expect("a clip");
+        alone.set_clips(clips.clone()).expect("a clip");
+        stage.set_clips(clips).expect("a clip");
+        alone.turn(DVec2::new(turn, 3.0));
+        stage.turn(DVec2::new(turn, 3.0));
+        rest(&mut alone);
+        assert!(rest_helped(&mut stage, &mut helper, || false) >= 2, "bands of several frames");
+        assert!(stage.frame().is_some_and(|frame| frame.is_exact));
+        let pictures = [&alone, &stage].map(|stage| &stage.frame().expect("a frame").picture);
+        assert!(pictures[0].color == pictures[1].color && pictures[0].depth == pictures[1].depth);
+    }
+    // A helper that fails: the stage draws its band.
+    stage.turn(DVec2::ZERO);
+    assert_eq!(rest_helped(&mut stage, &mut helper, || true), 1);
+    assert!(stage.pixels() == alone.pixels());
+    // What is no band, or that of a frame that was given up.
+    assert!(helper.help("{}").is_err() && helper.help("").is_err());
+    stage.set_helpers(1);
+    stage.turn(DVec2::ZERO);
+    assert_eq!(stage.step().expect("a step"), Step::Works);
+    let job = stage.lend().expect("a band of a moving frame");
+    let asked: serde_json::Value = serde_json::from_str(&job).expect("JSON");
+    let frame = asked["frame"].as_u64().expect("a number");
+    assert!(stage.give_back(frame, 1, &[0.0; 5]).is_err());
+    assert!(stage.give_back(frame - 1, 1, &[0.0; 5]).is_ok(), "it is not asked for any more");
+}
+
+/// A transfer function changes while a helper draws.
+#[test]
+fn helpers_follow_transfer_functions() {
+    let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "a.nrrd"}]}"#;
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n\n";
+    let mut samples = header.to_owned().into_bytes();
+    samples.extend((0..512u32).map(|at| (at % 8 * 30) as u8));
+    let files = BTreeMap::from([("a.nrrd".into(), samples)]);
+    let open = || Stage::open(text, held(&files), SIZE, &Device::Cpu).expect("a volume");
+    let [mut alone, mut stage, mut helper] = [open(), open(), open()];
+    let transfer = TransferFunction {
+        color: vec![(0.0, [1.0, 0.3, 0.1])],
+        opacity: vec![(0.0, 0.0), (0.1 + 200.0, 1.0 / 3.0)],
+        ..TransferFunction::default()
+    };
+    stage.set_helpers(1);
+    rest_helped(&mut stage, &mut helper, || false);
+    let before = stage.pixels();
+    stage.turn(DVec2::new(1.0, 0.0));
+    assert_eq!(stage.step().expect("a step"), Step::Works);
+    let job = stage.lend().expect("a band");
+    stage.set_transfer(0, &transfer).expect("a field");
+    alone.turn(DVec2::new(1.0, 0.0));
+    alone.set_transfer(0, &transfer).expect("a field");
+    rest(&mut alone);
+    rest_helped(&mut stage, &mut helper, || false);
+    assert!(stage.pixels() == alone.pixels() && stage.pixels() != before);
+    let drawn = helper.help(&job).expect("a band of before");
+    stage.give_back(1, 1, &drawn).expect("nothing asks for it");
+    assert!(stage.pixels() == alone.pixels());
 }
