@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 
 import numpy as np
@@ -27,7 +28,7 @@ import pysplatkit
 z, y, x = np.meshgrid(*3 * [np.linspace(-1, 1, 40)], indexing="ij")
 values = np.exp(-6 * ((x - 0.2) ** 2 + y**2 + (z + 0.1) ** 2)) + 0.1 * x
 scene = pysplatkit.Scene().add_volume(values)
-widget = scene.show(size={SIZE})
+widget = scene.show(size={SIZE}, draws="kernel")
 
 def write(change):
     if change.new:
@@ -191,3 +192,49 @@ def test_frames_follow_the_hand(notebook):
     print(f"{rate:.1f} frames/s, {widths} pixels wide, {longest:.0f} ms at most")
     # Far fewer than usual: the machine may be busy.
     assert rate > 4 and longest < 1500
+
+
+#: A notebook whose scene the browser draws.
+LOCAL = f"""
+import json, os
+import numpy as np
+import pysplatkit
+
+z, y, x = np.meshgrid(*3 * [np.linspace(-1, 1, 40)], indexing="ij")
+scene = pysplatkit.Scene().add_volume(np.exp(-6 * ((x - 0.2) ** 2 + y**2 + (z + 0.1) ** 2)))
+widget = scene.show(size={SIZE}, draws="browser")
+
+def write(change):
+    with open("new.json", "w") as file:
+        json.dump(widget.camera.position, file)
+    os.replace("new.json", "camera.json")
+
+widget.observe(write, "camera")
+"""
+
+
+@pytest.mark.skipif(
+    not os.environ.get("SPLATKIT_VIEWER"), reason="SPLATKIT_VIEWER names no viewer for pages"
+)
+def test_the_browser_draws_once_it_has_the_page(tmp_path):
+    camera = tmp_path / "camera.json"
+    with jupyterlab(tmp_path, LOCAL) as start, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1300, "height": 1000})
+        start(page)
+        page.wait_for_selector(".splatkit-page", state="visible", timeout=1000 * PATIENCE)
+        status = page.locator(".splatkit-status")
+        deadline = time.monotonic() + PATIENCE
+        while "exact · browser" not in status.inner_text() and time.monotonic() < deadline:
+            time.sleep(0.2)
+        assert "exact · browser" in status.inner_text()
+        page.screenshot(path=tmp_path / "shown.png")
+        box = page.locator(".splatkit-page").bounding_box()
+        page.mouse.move(box["x"] + 100, box["y"] + 100)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 180, box["y"] + 120, steps=8)
+        page.mouse.up()
+        while not camera.exists() and time.monotonic() < deadline:
+            time.sleep(0.2)
+        assert camera.exists(), (tmp_path / "log.txt").read_text()
+        browser.close()

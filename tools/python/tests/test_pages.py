@@ -11,6 +11,7 @@ from pysplatkit import Scene
 
 SIZE = (160, 120)
 
+
 def likeness(first, second):
     """Returns how alike two pictures are, in dB."""
     error = np.mean((first.rgba.astype(float) - second.rgba.astype(float)) ** 2)
@@ -30,12 +31,15 @@ def scenes(data):
     channels = np.stack([blob(), blob()[::-1]])
     yield "channels", Scene().add_volume(channels, channel_axis=0, channel_names=["a", "b"])
     count = 30
-    yield "gaussians", Scene().add_gaussians(
-        np.random.default_rng(1).normal(size=(count, 3)),
-        np.full((count, 3), 0.3),
-        np.tile([1.0, 0, 0, 0], (count, 1)),
-        np.full(count, 0.9),
-        colors=np.random.default_rng(2).uniform(size=(count, 3)),
+    yield (
+        "gaussians",
+        Scene().add_gaussians(
+            np.random.default_rng(1).normal(size=(count, 3)),
+            np.full((count, 3), 0.3),
+            np.tile([1.0, 0, 0, 0], (count, 1)),
+            np.full(count, 0.9),
+            colors=np.random.default_rng(2).uniform(size=(count, 3)),
+        ),
     )
     yield "files", Scene().add(data / "colors.ply").add(data / "volume.npy")
 
@@ -90,9 +94,9 @@ def test_what_no_page_shows_is_told(tmp_path, viewer):
             scene.save_html(tmp_path / "a.html", **{"viewer": viewer, **options})
     with pytest.raises(pysplatkit.ArgumentError, match="empty"):
         Scene().save_html(tmp_path / "a.html", viewer=viewer)
-    with pytest.raises(pysplatkit.ArgumentError, match="not .txt"):
+    with pytest.raises(pysplatkit.ArgumentError, match="a page is an"):
         scene.save_html(tmp_path / "a.txt", viewer=viewer)
-    samples = Scene().add_samples(ball()[0], np.ones(len(ball()[0])))
+    samples = Scene().add_samples(*particles())
     with pytest.raises(pysplatkit.ArgumentError, match="scattered samples"):
         samples.save_html(tmp_path / "a.html", viewer=viewer)
     assert not (tmp_path / "a.html").exists()

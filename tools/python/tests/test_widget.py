@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import ball, blob
+from conftest import ball, blob, particles
 
 import pysplatkit
 from pysplatkit import Camera, Scene, TransferFunction, _painter
@@ -421,7 +421,8 @@ def test_the_kernel_draws_what_no_page_shows(viewer, monkeypatch, scene):
         scene.show(draws="moon")
     assert not scene.show(size=SIZE, draws="kernel")._has_page
     monkeypatch.setenv("SPLATKIT_VIEWER", str(viewer))
-    samples = Scene().add_samples(ball()[0], np.ones(len(ball()[0])), radii=np.full(len(ball()[0]), 0.2))
+    positions, values = particles()
+    samples = Scene().add_samples(positions, values, radii=np.full(len(values), 0.2))
     widget = rest(samples.show(size=SIZE, draws="browser"))
     tell(widget, ("page", {"number": 0}))
     assert "scattered samples" in eventually(lambda: widget._error)

@@ -68,5 +68,5 @@ def _bytes(limit: int | str) -> int:
     except (ValueError, OverflowError):
         count = 0
     if count <= 0:
-        raise ArgumentError(f"limit is a number of bytes, such as \"20MB\", not {limit!r}")
+        raise ArgumentError(f'limit is a number of bytes, such as "20MB", not {limit!r}')
     return count

@@ -879,9 +879,7 @@ class Scene:
         text = None if camera is None else camera.to_json()
         return self._native.render(text, fit, _options.drawn(**draw))
 
-    def _said(
-        self, camera: Camera | None, given: Mapping[str, Any], method: str
-    ) -> dict[str, Any]:
+    def _said(self, camera: Camera | None, given: Mapping[str, Any], method: str) -> dict[str, Any]:
         """Returns what a scene file says beside the inputs: what is given, and otherwise what the
         scene file says that `open` has read."""
         known = _options.DRAWING | _options.PAGE | _options.VIEW | {"size"}
