@@ -788,6 +788,125 @@ tests["splatkit serve"] = async () => {
   }
 };
 
+/** The seconds of a flight. FLIGHT=300 POINTS=5000000 shows whether memory stays bounded. */
+const FLIGHT = Number(process.env.FLIGHT ?? 12);
+
+/** Returns the megabytes of a page: of the engine, of JavaScript, and of its process. */
+async function memoryOf(page) {
+  const engine = await page.workers()[0].evaluate(() => memory.buffer.byteLength);
+  const script = await page.evaluate(() => performance.memory.usedJSHeapSize);
+  const cdp = await browser.newBrowserCDPSession();
+  const { processInfo } = await cdp.send("SystemInfo.getProcessInfo");
+  await cdp.detach();
+  const resident = ({ id }) => {
+    const status = fs.existsSync(`/proc/${id}/status`) ? fs.readFileSync(`/proc/${id}/status`, "utf8") : "";
+    return 1024 * Number(/VmRSS:\s+(\d+)/.exec(status)?.[1] ?? 0);
+  };
+  const renderers = processInfo.filter(({ type }) => type === "renderer").map(resident);
+  return [engine, script, Math.max(...renderers)].map((bytes) => Math.round(bytes / 2 ** 20));
+}
+
+tests["a long flight"] = async () => {
+  const { cloud } = makeLarge();
+  const process = spawn(splatkit, ["--quiet", "serve", `large/${cloud}`, ...look, "--no-open", "--viewer", viewer], { cwd: work });
+  try {
+    const line = await new Promise((done) => process.stdout.once("data", done));
+    const page = await opened(/http:\S+/.exec(line)[0]);
+    await firstFrame(page);
+    const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
+    const [end, samples] = [performance.now() + 1000 * FLIGHT, []];
+    for (let step = 0; performance.now() < end; step++) {
+      // Around and into the cloud, with rests.
+      const [turn, far] = [0.11 * step, 1.6 + 1.3 * Math.sin(0.07 * step)];
+      const position = [far * Math.cos(turn), far * Math.sin(turn), Math.sin(0.03 * step)].map((v, axis) => camera.focal_point[axis] + v);
+      await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), { ...camera, position });
+      await page.waitForTimeout(step % 25 === 24 ? 2500 : 120);
+      if (step % 10 === 0) samples.push(await memoryOf(page));
+    }
+    await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), camera);
+    await page.waitForTimeout(200);
+    const events = await page.evaluate(() => heard.splice(0));
+    assert.equal(events.find(({ name }) => name === "error"), undefined);
+    ended(await rested(page));
+    samples.push(await memoryOf(page));
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+    const most = (from, to) => [0, 1, 2].map((kind) => Math.max(...samples.slice(from, to).map((sample) => sample[kind])));
+    const half = samples.length >> 1;
+    const [first, second] = [most(0, half), most(half)];
+    fs.writeFileSync(at("flight.json"), JSON.stringify(samples));
+    assert.ok(second[0] <= 2048 && second[1] <= 256, `${second} MiB`);
+    // Long flights have seen everything in their first half.
+    if (FLIGHT >= 120) assert.ok(second[0] <= 1.1 * first[0] && second[2] <= 1.15 * first[2], `${first}, then ${second} MiB`);
+    const frames = events.filter(({ name }) => name === "frame").length;
+    return `${frames} frames in ${FLIGHT} s; engine ${first[0]}, then ${second[0]} MiB, script ${first[1]}, then ${second[1]} MiB, process ${first[2]}, then ${second[2]} MiB`;
+  } finally {
+    process.kill();
+  }
+};
+
+/** Returns an engine whose memory cannot have more than these MiB. */
+function withMemory(wasm, most) {
+  const leb = (value) => (value < 128 ? [value] : [(value & 127) | 128, ...leb(value >> 7)]);
+  const read = (at) => {
+    let [value, shift] = [0, 0];
+    for (; wasm[at] & 128; at++, shift += 7) value |= (wasm[at] & 127) << shift;
+    return [value | (wasm[at] << shift), at + 1];
+  };
+  for (let at = 8; at < wasm.length; ) {
+    const [size, start] = read(at + 1);
+    if (wasm[at] === 5) {
+      const [least] = read(start + 2);
+      const section = [1, 1, ...leb(least), ...leb(16 * most)];
+      return Buffer.concat([wasm.subarray(0, at), Buffer.from([5, ...leb(section.length), ...section]), wasm.subarray(start + size)]);
+    }
+    at = start + size;
+  }
+  throw new Error("the engine has no memory");
+}
+
+tests["a small memory"] = async () => {
+  makeLarge();
+  const folder = at("little");
+  fs.rmSync(folder, { recursive: true, force: true });
+  fs.mkdirSync(folder);
+  const engine = fs.readFileSync(path.join(viewer, "splatkit.wasm"));
+  fs.copyFileSync(path.join(viewer, "splatkit-viewer.js"), path.join(folder, "splatkit-viewer.js"));
+  fs.writeFileSync(path.join(folder, "whole.html"), fs.readFileSync(at("large/cloud.html"), "utf8").replace("cloud.json", "cloud.ply"));
+  const server = await served([folder, at("large")], { ranges: true });
+  const worker = fs.readFileSync(path.join(viewer, "splatkit-worker.js"), "utf8");
+  const said = [];
+  // The name, the MiB of the engine, and the GiB that the browser tells. The whole file is too large; in
+  // parts there is enough for the view, or words.
+  for (const [name, most, machine] of [["whole", 192, 8], ["whole", 320, 8], ["cloud", 96, 8], ["cloud", 512, 8], ["cloud", 384, 1]]) {
+    fs.writeFileSync(path.join(folder, "splatkit-worker.js"), `Object.defineProperty(navigator, "deviceMemory", { value: ${machine} });\n${worker}`);
+    fs.writeFileSync(path.join(folder, "splatkit.wasm"), withMemory(engine, most));
+    const page = await opened(`${server.address}${name}.html`);
+    const events = await rested(page);
+    const error = events.find(({ name }) => name === "error");
+    const what = `${name} in ${most} MiB, ${machine} GiB told`;
+    if (error) {
+      assert.match(error.message, /memory|shown coarser/);
+      assert.ok(!events.some(({ name, isExact }) => name === "frame" && isExact), "words, or an exact picture");
+      said.push(`${what}: ${error.message}`);
+    } else {
+      ended(events);
+      await saved(page, `little-${name}.png`);
+      run("render", name === "whole" ? "large/cloud.ply" : `large/cloud-${POINTS}.splk`, ...look, "--size", SIZE.join("x"), "--engine", "cpu", "-o", "little-native.png", "--overwrite");
+      const alike = likeness(`little-${name}.png`, "little-native.png");
+      assert.ok(alike >= LEAST, `${alike} dB`);
+      said.push(`${what}: ${alike} dB`);
+    }
+    await page.screenshot({ path: at(`little-${name}-${most}.png`) });
+    await page.context().close();
+  }
+  server.close();
+  assert.match(said[0], /needs more memory|needs \d+ bytes of memory|engine stopped/);
+  // What a small machine tells keeps its page alive.
+  assert.doesNotMatch(said.at(-1), /engine stopped/);
+  return said.join("; ");
+};
+
 tests["a package"] = async () => {
   const made = path.join(viewer, "../package");
   const { name, version, exports, files } = JSON.parse(fs.readFileSync(path.join(made, "package.json"), "utf8"));

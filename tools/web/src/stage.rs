@@ -623,7 +623,8 @@ impl Stage {
         self.pace.took(effort, milliseconds);
         let lacks = self.is_rough || self.files.lack();
         self.again = lacks.then(|| (effort, Instant::now()));
-        let is_exact = effort == Effort::EXACT && !lacks && !self.is_changed;
+        let is_whole = !lacks && !self.painter.is_missing();
+        let is_exact = effort == Effort::EXACT && is_whole && !self.is_changed;
         let picture = match effort == Effort::EXACT {
             true => drawing.reduced(picture, &self.loaded.items, &camera)?,
             false => picture,
