@@ -8,6 +8,8 @@ use splatkit::{
 };
 use std::path::PathBuf;
 
+mod parts;
+
 const SIZE: [u32; 2] = [96, 72];
 
 /// A ball of points that fills most of the picture.
