@@ -806,6 +806,22 @@ async function memoryOf(page) {
   return [engine, script, Math.max(...renderers)].map((bytes) => Math.round(bytes / 2 ** 20));
 }
 
+/** Flies around and into a cloud, with rests, and back. Returns what the page takes meanwhile. */
+async function flown(page) {
+  const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
+  const [end, samples] = [performance.now() + 1000 * FLIGHT, []];
+  for (let step = 0; performance.now() < end && page.workers().length > 0; step++) {
+    const [turn, far] = [0.11 * step, 1.6 + 1.3 * Math.sin(0.07 * step)];
+    const position = [far * Math.cos(turn), far * Math.sin(turn), Math.sin(0.03 * step)].map((v, axis) => camera.focal_point[axis] + v);
+    await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), { ...camera, position });
+    await page.waitForTimeout(step % 25 === 24 ? 2500 : 120);
+    if (step % 10 === 0) samples.push(await memoryOf(page));
+  }
+  await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), camera);
+  await page.waitForTimeout(200);
+  return samples;
+}
+
 tests["a long flight"] = async () => {
   const { cloud } = makeLarge();
   const process = spawn(splatkit, ["--quiet", "serve", `large/${cloud}`, ...look, "--no-open", "--viewer", viewer], { cwd: work });
@@ -813,18 +829,7 @@ tests["a long flight"] = async () => {
     const line = await new Promise((done) => process.stdout.once("data", done));
     const page = await opened(/http:\S+/.exec(line)[0]);
     await firstFrame(page);
-    const camera = await page.evaluate(() => document.querySelector("splatkit-viewer").camera);
-    const [end, samples] = [performance.now() + 1000 * FLIGHT, []];
-    for (let step = 0; performance.now() < end; step++) {
-      // Around and into the cloud, with rests.
-      const [turn, far] = [0.11 * step, 1.6 + 1.3 * Math.sin(0.07 * step)];
-      const position = [far * Math.cos(turn), far * Math.sin(turn), Math.sin(0.03 * step)].map((v, axis) => camera.focal_point[axis] + v);
-      await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), { ...camera, position });
-      await page.waitForTimeout(step % 25 === 24 ? 2500 : 120);
-      if (step % 10 === 0) samples.push(await memoryOf(page));
-    }
-    await page.evaluate((camera) => (document.querySelector("splatkit-viewer").camera = camera), camera);
-    await page.waitForTimeout(200);
+    const samples = await flown(page);
     const events = await page.evaluate(() => heard.splice(0));
     assert.equal(events.find(({ name }) => name === "error"), undefined);
     ended(await rested(page));
@@ -865,22 +870,37 @@ function withMemory(wasm, most) {
   throw new Error("the engine has no memory");
 }
 
-tests["a small memory"] = async () => {
+/** Serves the large files with an engine of so many MiB, in a browser that tells so many GiB. */
+async function littleServed(most, machine) {
   makeLarge();
   const folder = at("little");
-  fs.rmSync(folder, { recursive: true, force: true });
-  fs.mkdirSync(folder);
-  const engine = fs.readFileSync(path.join(viewer, "splatkit.wasm"));
-  fs.copyFileSync(path.join(viewer, "splatkit-viewer.js"), path.join(folder, "splatkit-viewer.js"));
+  fs.mkdirSync(folder, { recursive: true });
+  const [engine, worker] = ["splatkit.wasm", "splatkit-worker.js"].map((file) => fs.readFileSync(path.join(viewer, file)));
+  fs.writeFileSync(path.join(folder, "splatkit.wasm"), withMemory(engine, most));
+  fs.writeFileSync(path.join(folder, "splatkit-worker.js"), `Object.defineProperty(navigator, "deviceMemory", { value: ${machine} });\n${worker}`);
   fs.writeFileSync(path.join(folder, "whole.html"), fs.readFileSync(at("large/cloud.html"), "utf8").replace("cloud.json", "cloud.ply"));
-  const server = await served([folder, at("large")], { ranges: true });
-  const worker = fs.readFileSync(path.join(viewer, "splatkit-worker.js"), "utf8");
+  return served([folder, at("large"), viewer], { ranges: true });
+}
+
+tests["a flight in a small memory"] = async () => {
+  const server = await littleServed(384, 1);
+  const page = await opened(`${server.address}cloud.html`);
+  await firstFrame(page);
+  const samples = await flown(page);
+  const events = await page.evaluate(() => heard.splice(0));
+  assert.ok(!events.some(({ name, isFatal }) => name === "error" && isFatal), events.find(({ name }) => name === "error")?.message);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+  server.close();
+  return `${Math.max(...samples.map(([engine]) => engine))} MiB at most, in ${events.filter(({ name }) => name === "frame").length} frames`;
+};
+
+tests["a small memory"] = async () => {
   const said = [];
   // The name, the MiB of the engine, and the GiB that the browser tells. The whole file is too large; in
   // parts there is enough for the view, or words.
   for (const [name, most, machine] of [["whole", 192, 8], ["whole", 320, 8], ["cloud", 96, 8], ["cloud", 512, 8], ["cloud", 384, 1]]) {
-    fs.writeFileSync(path.join(folder, "splatkit-worker.js"), `Object.defineProperty(navigator, "deviceMemory", { value: ${machine} });\n${worker}`);
-    fs.writeFileSync(path.join(folder, "splatkit.wasm"), withMemory(engine, most));
+    const server = await littleServed(most, machine);
     const page = await opened(`${server.address}${name}.html`);
     const events = await rested(page);
     const error = events.find(({ name }) => name === "error");
@@ -899,8 +919,8 @@ tests["a small memory"] = async () => {
     }
     await page.screenshot({ path: at(`little-${name}-${most}.png`) });
     await page.context().close();
+    server.close();
   }
-  server.close();
   assert.match(said[0], /needs more memory|needs \d+ bytes of memory|engine stopped/);
   // What a small machine tells keeps its page alive.
   assert.doesNotMatch(said.at(-1), /engine stopped/);
