@@ -185,7 +185,7 @@ mod tests {
     fn pixels_are_no_wider_than_they_pay() {
         // Splats that take their time at every width, and a few that do not.
         for (fixed, of_pixels, widest) in
-            [(100.0, 38.0, 1.5), (30.0, 108.0, 5.0), (5.0, 400.0, 8.0)]
+            [(100.0, 38.0, 1.5), (30.0, 108.0, 6.0), (5.0, 400.0, 8.0)]
         {
             let time = |effort: Effort| fixed + of_pixels / effort.pixel;
             let mut pace = Pace::new(30.0);

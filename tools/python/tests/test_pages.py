@@ -25,9 +25,9 @@ def scenes(data):
     height = vertices[:, 2].astype(np.float32)
     yield "mesh", Scene().add_mesh(vertices + shift, faces, values=height, colormap="magma")
     points = particles()[0]
-    yield "points", Scene().add_points(points, radii=np.full(len(points), 0.05))
+    yield "points", Scene().add_points(points, radius=np.full(len(points), 0.05))
     moved = Scene().add_volume(blob(), spacing=(1, 2, 1), value_name="heat")
-    yield "volume", moved.transform("volume", rotate=(0, 0, 30), translate=(5, 0, 0))
+    yield "volume", moved.transform("volume", rotate=("z", 30), translate=(5, 0, 0))
     channels = np.stack([blob(), blob()[::-1]])
     yield "channels", Scene().add_volume(channels, channel_axis=0, channel_names=["a", "b"])
     count = 30

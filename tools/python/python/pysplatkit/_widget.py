@@ -339,7 +339,7 @@ class Widget(anywidget.AnyWidget):
         self.send({"type": "page", "number": number, "count": count}, [part])
 
     def _draws(self, size: tuple[int, int]) -> str:
-        return _options.drawn(size, **self._drawing)
+        return _options.drawn(size, behind=self._background, **self._drawing)
 
     def _fitted(self, size: tuple[int, int], view: str | None = None) -> Camera:
         text = self._scene._native.camera(_options.fit(view=view), self._draws(size))

@@ -215,7 +215,7 @@ fn a_gpu_that_refuses_a_scene_leaves_it_to_the_processor() {
     assert!(rest(&mut stage) >= 1);
 }
 
-/// Draws until nothing is left to do, with a stage that helps. Returns the steps that waited for it.
+/// Draws until nothing is left to do, with a stage that helps. Returns the steps that waited.
 fn rest_helped(stage: &mut Stage, helper: &mut Stage, mut fails: impl FnMut() -> bool) -> usize {
     let (mut waited, mut lent) = (0, None);
     for _ in 0..500 {
