@@ -78,13 +78,10 @@ impl TemporaryFolder {
     pub fn new() -> crate::Result<Self> {
         let place = std::env::temp_dir();
         let mut live = live();
-        let mut builder = std::fs::DirBuilder::new();
-        #[cfg(unix)]
-        std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
         let (number, process) = (next_number(), std::process::id());
         for try_number in 0..MOST {
             let path = place.join(format!("splatkit-{process}-{number}-{try_number}"));
-            match builder.create(&path) {
+            match create_private(&path) {
                 Ok(()) => {
                     live.insert(number, path.clone());
                     return Ok(Self { number, path });
@@ -101,6 +98,19 @@ impl TemporaryFolder {
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// Makes a folder that nobody else can read.
+#[cfg(unix)]
+fn create_private(path: &Path) -> io::Result<()> {
+    use std::os::unix::fs::DirBuilderExt;
+    std::fs::DirBuilder::new().mode(0o700).create(path)
+}
+
+/// Makes a folder. Those of the system's temporary files are the user's own here.
+#[cfg(not(unix))]
+fn create_private(path: &Path) -> io::Result<()> {
+    std::fs::create_dir(path)
 }
 
 impl Drop for TemporaryFolder {

@@ -1,7 +1,7 @@
 //! Stops every writer at each of its steps.
 
 use super::{
-    AtomicFile,
+    AtomicFile, TemporaryFolder,
     faults::{self, Fault},
     step::Step,
     write,
@@ -454,4 +454,21 @@ fn nothing_that_appears_is_replaced() {
     super::may_replace(folder.path("file"), true);
     write(&folder.path("file"), b"new").unwrap();
     assert_eq!(std::fs::read(folder.path("file")).unwrap(), b"new");
+}
+
+#[test]
+fn a_temporary_folder_goes_with_its_owner() {
+    let [first, second] = [TemporaryFolder::new().unwrap(), TemporaryFolder::new().unwrap()];
+    assert_ne!(first.path(), second.path());
+    let file = first.path().join("a.ply");
+    std::fs::write(&file, OLD).unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = first.path().metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{mode:o}");
+    }
+    let path = first.path().to_owned();
+    drop(first);
+    assert!(!path.exists() && second.path().is_dir());
 }
