@@ -3,6 +3,10 @@
 //! Two of the eight nearest neighbours are joined if they are no farther apart than a few times the
 //! usual distance around either, or if they reach each other. A cluster of few points far from all
 //! others is a floater.
+//!
+//! Strays that are evenly scattered have each other as neighbours, at a distance that is usual among
+//! them. So what is usual around nearly all points bounds how far points are joined. Nearly all: the
+//! parts of a scan that are far from its scanner are sparse.
 
 use super::Context;
 use crate::{Error, Result, math::neighbours::Neighbours, parallel::prelude::*};
@@ -12,6 +16,10 @@ use glam::Vec3;
 const COUNT: usize = 8;
 /// Neighbours are joined up to this many times the mean distance around either.
 const REACH: f32 = 4.0;
+/// Neighbours are joined up to this many times the mean distance that this share of all points does
+/// not exceed.
+const MOST_REACH: f32 = 6.0;
+const NEARLY_ALL: f64 = 0.98;
 /// A cluster of fewer points is a floater, or of less than this share of all points if there are
 /// few.
 const FEWEST: u64 = 64;
@@ -65,11 +73,13 @@ impl Clusters {
                 there.map(|(distance, _)| distance).sum::<f32>() / count
             };
             let usual: Vec<f32> = near.par_iter().map(usual).collect();
+            let bound = MOST_REACH * quantile(usual.clone(), NEARLY_ALL);
             for (at, near) in near.iter().enumerate() {
                 for &(distance, other) in near.iter().filter(|(_, other)| *other != u32::MAX) {
                     let other = other as usize;
                     let ends = [kept[at], kept[other]].map(|point| reaches[point as usize]);
-                    let most = (REACH * usual[at].min(usual[other])).max(2.0 * (ends[0] + ends[1]));
+                    let usual = (REACH * usual[at].min(usual[other])).min(bound);
+                    let most = usual.max(2.0 * (ends[0] + ends[1]));
                     if distance <= most {
                         sets.join(kept[at], kept[other]);
                     }
@@ -104,6 +114,13 @@ impl Clusters {
     }
 }
 
+/// Returns the number that this share of some numbers does not exceed. There is at least one.
+fn quantile(mut numbers: Vec<f32>, share: f64) -> f32 {
+    let rank = (numbers.len() as f64 * share).ceil() as usize;
+    let at = rank.clamp(1, numbers.len()) - 1;
+    *numbers.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
 /// Disjoint sets, each with its least member as the root.
 pub(super) struct Sets(Vec<u32>);
 
@@ -130,6 +147,7 @@ impl Sets {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec2;
 
     /// A square grid of points around a place.
     fn grid(side: usize, step: f32, at: Vec3) -> Vec<Vec3> {
@@ -162,6 +180,25 @@ mod tests {
         let mut reaches = vec![0.0; places.len()];
         reaches[whole] = 2.0;
         assert!(Clusters::new(&places, &reaches, &[]).without_floaters()[whole]);
+    }
+
+    #[test]
+    fn evenly_scattered_strays_are_floaters() {
+        // Ground around a scanner, whose points are the sparser the farther they are.
+        let turn = |index: usize| (index as f32 * 0.618_034).fract() * std::f32::consts::TAU;
+        let away = |index: usize| 1.5 * 30f32.powf(index as f32 / 20_000.0);
+        let ground = |index: usize| (Vec2::from_angle(turn(index)) * away(index)).extend(0.0);
+        let mut places: Vec<Vec3> = (0..20_000).map(ground).collect();
+        let scan = places.len();
+        let part = |index: usize, by: f64| (index as f64 * by).fract() as f32 - 0.5;
+        let place = |index: usize| {
+            let parts = [0.819_172_5, 0.671_043_6, 0.549_700_5].map(|by| part(index, by));
+            200.0 * Vec3::from(parts) + Vec3::new(0.0, 0.0, 120.0)
+        };
+        places.extend((0..300).map(place));
+        let clusters = Clusters::new(&places, &vec![0.0; places.len()], &[]);
+        let kept = clusters.without_floaters();
+        assert_eq!((count(&kept[..scan]), count(&kept[scan..])), (scan, 0));
     }
 
     #[test]
