@@ -20,6 +20,8 @@ pub struct Distances {
 }
 
 /// How much a value differs between each point of the first scene and the nearest one of the other.
+/// Where as many points of both are at one place, they are paired in the order of their values;
+/// where several others are nearest, the one with the nearest value counts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValueDifference {
     /// The name of the value, which both scenes have.
@@ -59,12 +61,16 @@ pub fn compare_scenes(a: &dyn Editable, b: &dyn Editable) -> Result<SceneCompari
     let (places_a, places_b) = (places(a, origin), places(b, origin));
     let (there, nearest) = distances(&places_a, &places_b);
     let (back, _) = distances(&places_b, &places_a);
+    let [at_one_place, others] = [&places_a, &places_b].map(|places| Stacks::of(places));
     let (names_a, names_b) = (a.names(), b.names());
     let mut values = Vec::new();
     for name in names_a.iter().filter(|name| names_b.contains(name)) {
         let (Some(one), Some(other)) = (a.column(name), b.column(name)) else { continue };
-        let differences = one.iter().zip(&nearest).map(|(value, at)| value - other[*at as usize]);
-        let sizes: Vec<f64> = differences.map(f64::abs).filter(|size| !size.is_nan()).collect();
+        let mut sizes = Vec::with_capacity(one.len());
+        for stack in at_one_place.all() {
+            let other = values_of(others.with(nearest[stack[0] as usize]), &other);
+            differences(values_of(stack, &one), other, &mut sizes);
+        }
         values.push(ValueDifference {
             name: name.clone(),
             count: sizes.len() as u64,
@@ -82,6 +88,63 @@ pub fn compare_scenes(a: &dyn Editable, b: &dyn Editable) -> Result<SceneCompari
         values,
         unmatched: [only(&names_a, &names_b), only(&names_b, &names_a)],
     })
+}
+
+/// Points by their places: those at one place follow each other.
+struct Stacks {
+    /// The first point at the place of each point.
+    first: Vec<u32>,
+    order: Vec<u32>,
+    /// Where in the order the stack of each first point begins.
+    starts: Vec<u32>,
+}
+
+impl Stacks {
+    fn of(places: &[Vec3]) -> Self {
+        let first = Neighbours::first_of_equals(places);
+        let mut order: Vec<u32> = (0..places.len() as u32).collect();
+        order.par_sort_unstable_by_key(|&at| (first[at as usize], at));
+        let mut starts = vec![0; places.len()];
+        for (at, start) in order.iter().zip(0..) {
+            if first[*at as usize] == *at {
+                starts[*at as usize] = start;
+            }
+        }
+        Self { first, order, starts }
+    }
+
+    /// Returns all stacks.
+    fn all(&self) -> impl Iterator<Item = &[u32]> {
+        self.order.chunk_by(|one, other| self.first[*one as usize] == self.first[*other as usize])
+    }
+
+    /// Returns the points at the place of a first point.
+    fn with(&self, first: u32) -> &[u32] {
+        let there = &self.order[self.starts[first as usize] as usize..];
+        let count = there.iter().take_while(|at| self.first[**at as usize] == first).count();
+        &there[..count]
+    }
+}
+
+/// Returns the values of some points, smallest first, without missing ones.
+fn values_of(points: &[u32], values: &[f64]) -> Vec<f64> {
+    let values = points.iter().map(|at| values[*at as usize]);
+    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// Adds the sizes of the differences of values at one place from those of the points there.
+fn differences(values: Vec<f64>, others: Vec<f64>, sizes: &mut Vec<f64>) {
+    if values.len() == others.len() {
+        // Smallest with smallest: no other pairs differ less in all.
+        sizes.extend(values.iter().zip(&others).map(|(value, other)| (value - other).abs()));
+    } else if !others.is_empty() {
+        let least = |value: &f64| {
+            others.iter().map(|other| (value - other).abs()).fold(f64::INFINITY, f64::min)
+        };
+        sizes.extend(values.iter().map(least));
+    }
 }
 
 fn places(scene: &dyn Editable, origin: DVec3) -> Vec<Vec3> {
@@ -143,8 +206,26 @@ mod tests {
         assert_eq!(compared.unmatched, [Vec::<String>::new(), Vec::new()]);
         let same = compare_scenes(&a, &a).unwrap();
         assert_eq!((same.there.largest, same.back.rms), (0.0, 0.0));
+        assert_eq!(same.values[0].largest, 0.0);
         assert!(compare_scenes(&a, &cloud(&[], &[])).is_err());
         let bare = cloud(&[Vec3::ZERO], &[]);
         assert_eq!(compare_scenes(&a, &bare).unwrap().unmatched[0].len(), 4);
+    }
+
+    #[test]
+    fn points_at_one_place_are_paired_by_their_values() {
+        let places = [Vec3::X, Vec3::ZERO, Vec3::X, Vec3::X];
+        let red = |reds: &[u8], others: &[u8]| {
+            let [a, b] = [reds, others].map(|reds| cloud(&places[..reds.len()], reds));
+            let red = compare_scenes(&a, &b).unwrap().values.swap_remove(0);
+            (red.count, red.largest)
+        };
+        assert_eq!(red(&[10, 20, 30, 40], &[10, 20, 30, 40]), (4, 0.0));
+        // Another order is no difference, and another value is.
+        assert_eq!(red(&[10, 20, 30, 40], &[40, 20, 10, 30]), (4, 0.0));
+        assert_eq!(red(&[10, 20, 30, 40], &[41, 20, 10, 30]), (4, 1.0));
+        assert_eq!(red(&[10, 20, 10, 40], &[10, 20, 40, 40]), (4, 30.0));
+        // Copies that the other scene lacks have the nearest value.
+        assert_eq!(red(&[10, 20, 30, 40], &[10, 20, 38]), (4, 8.0));
     }
 }
