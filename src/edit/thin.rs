@@ -76,7 +76,7 @@ impl Thin {
             return Ok(vec![true; places.len()]);
         }
         memory::room(WORK, OF_KEPT.saturating_mul(wanted))?;
-        let mut kept = spread(places, wanted);
+        let Found { mut kept, .. } = spread(places, wanted);
         let surplus = kept.iter().filter(|kept| **kept).count() as u64 - wanted;
         leave_out(&mut kept, surplus);
         Ok(kept)
@@ -93,7 +93,7 @@ impl Thin {
 }
 
 /// Returns the discs that keep at least the wanted number of points, and only a few more.
-fn spread(places: &[Vec3], wanted: u64) -> Vec<bool> {
+fn spread(places: &[Vec3], wanted: u64) -> Found {
     let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (low, high) = places.iter().fold(none, |(low, high), at| (low.min(*at), high.max(*at)));
     let size = high - low;
@@ -112,10 +112,10 @@ fn spread(places: &[Vec3], wanted: u64) -> Vec<bool> {
         if sample.len() > SAMPLE / 4 {
             let share = sample.len() as f64 / places.len() as f64;
             let of_sample = (wanted as f64 * share).ceil() as u64;
-            guess = search((places, &blocks), &sample, of_sample, [guess, largest]).0;
+            guess = search((places, &blocks), &sample, of_sample, [guess, largest]).distance;
         }
     }
-    search((places, &blocks), order, wanted, [guess, largest]).1
+    search((places, &blocks), order, wanted, [guess, largest])
 }
 
 /// Blocks of space, in a grid of slabs. What was kept two slabs before is not needed any more.
@@ -162,41 +162,89 @@ impl Blocks {
     }
 }
 
-/// Tries distances of some points, from a guess on and below a largest one. Returns one that keeps
-/// enough points and few more, and which of all it keeps.
+/// A distance that keeps enough points and few more.
+struct Found {
+    distance: f64,
+    /// Which of all points it keeps.
+    kept: Vec<bool>,
+    /// The number of distances that were tried.
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests count them"))]
+    tries: usize,
+}
+
+/// Tries distances of some points, from a guess on and below a largest one.
 fn search(
     (places, blocks): (&[Vec3], &Blocks),
     order: &[u32],
     wanted: u64,
     [guess, largest]: [f64; 2],
-) -> (f64, Vec<bool>) {
+) -> Found {
     let most = (wanted as f64 * (1.0 + SURPLUS)) as u64;
-    // A distance that keeps too many, and one that keeps too few.
-    let mut ends = [0.0, 2.0 * largest];
-    let mut best = 0.0;
+    let mut trials = Trials::new(wanted as f64 * (1.0 + 0.5 * SURPLUS), 2.0 * largest);
     let mut kept = vec![false; places.len()];
-    let mut distance = guess;
-    for _ in 0..TRIES {
+    let (mut distance, mut tries) = (guess, 0);
+    while tries < TRIES && !trials.is_narrow() {
         let Some(count) = keep((places, blocks), order, distance, 4 * wanted, &mut kept) else {
             break;
         };
-        let is_enough = count >= wanted;
-        ends[usize::from(!is_enough)] = distance;
-        if is_enough && count <= 4 * wanted {
-            best = distance;
-            if count <= most {
-                return (best, kept);
-            }
+        tries += 1;
+        if (wanted..=most).contains(&count) {
+            return Found { distance, kept, tries };
         }
-        // Counts fall with about the square of the distance.
-        let ratio = count as f64 / (wanted as f64 * (1.0 + 0.5 * SURPLUS));
-        distance = between(ends[0], ends[1], distance * ratio.sqrt());
+        distance = trials.next(distance, count, count <= 4 * wanted);
     }
     // Without a distance, all are kept.
+    let [best, _] = trials.ends;
     if keep((places, blocks), order, best, u64::MAX, &mut kept).is_none() {
         order.iter().for_each(|at| kept[*at as usize] = true);
     }
-    (best, kept)
+    Found { distance: best, kept, tries }
+}
+
+/// Distances that were tried.
+struct Trials {
+    wanted: f64,
+    /// A distance that keeps too many, and one that keeps too few.
+    ends: [f64; 2],
+    /// The logarithms of the last distance and of its count, unless counting ended early.
+    last: Option<[f64; 2]>,
+    count: usize,
+}
+
+/// The powers of the distance with which counts may fall.
+const FALL: [f64; 2] = [0.5, 16.0];
+
+/// Between distances that are so near to each other, the count jumps: points of a grid are all as
+/// far apart.
+const NARROW: f64 = 1.01;
+
+impl Trials {
+    fn new(wanted: f64, largest: f64) -> Self {
+        Self { wanted, ends: [0.0, largest], last: None, count: 0 }
+    }
+
+    fn is_narrow(&self) -> bool {
+        self.ends[1] < NARROW * self.ends[0]
+    }
+
+    /// Adds a distance with its count, and returns the one to try next. `is_whole` says that all
+    /// were counted.
+    fn next(&mut self, distance: f64, count: u64, is_whole: bool) -> f64 {
+        self.ends[usize::from((count as f64) < self.wanted)] = distance;
+        self.count += 1;
+        let here = [distance.ln(), (count as f64).max(1.0).ln()];
+        // Of points on a surface, counts fall with the square of the distance. Where it is hardly
+        // larger than the points are apart already, they fall otherwise.
+        let fall = self.last.map_or(2.0, |last| (last[1] - here[1]) / (here[0] - last[0]));
+        let fall = if fall.is_finite() { fall.clamp(FALL[0], FALL[1]) } else { 2.0 };
+        self.last = is_whole.then_some(here);
+        let [low, high] = self.ends;
+        // Every third time, the range is halved.
+        if low > 0.0 && self.count.is_multiple_of(3) {
+            return (low * high).sqrt();
+        }
+        between(low, high, distance * (count as f64 / self.wanted).powf(1.0 / fall))
+    }
 }
 
 /// Marks the points that a distance keeps, until there are more than some. Returns their number;
@@ -500,6 +548,27 @@ mod tests {
         // Points at one place cannot be spread.
         let same = vec![Vec3::ONE; 100];
         assert_eq!(chosen(&same, &Thin::Count(7).kept(&same).unwrap()).len(), 7);
+    }
+
+    #[test]
+    fn few_distances_are_tried() {
+        let part = |index: usize, by: f64| (index as f64 * by).fract() as f32 - 0.5;
+        // From a grid, whose points are kept by jumps, to points without an order.
+        for noise in [0.0, 0.1, 0.5, 20.0] {
+            let place = |index: usize| {
+                let grid = Vec3::new((index % 200) as f32, (index / 200) as f32, 0.0);
+                grid + noise * Vec3::new(part(index, 0.754_877_7), part(index, 0.569_840_3), 0.0)
+            };
+            let places: Vec<Vec3> = (0..40_000).map(place).collect();
+            let mut all = 0;
+            for wanted in [100, 1000, 5000, 9000, 12_000, 20_000, 30_000] {
+                let Found { kept, tries, .. } = spread(&places, wanted);
+                let count = kept.iter().filter(|kept| **kept).count() as u64;
+                assert!(count >= wanted, "{noise}: {count} of {wanted}");
+                all += tries;
+            }
+            assert!(all <= 60, "{noise}: {all} tries");
+        }
     }
 
     #[test]
