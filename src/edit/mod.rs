@@ -61,7 +61,7 @@ pub(crate) use stream::grid_of_degrees;
 pub use surface::Surface;
 pub use thin::Thin;
 
-use crate::{Error, Result, memory, parallel::prelude::*};
+use crate::{Error, Result, math::keep, memory, parallel::prelude::*};
 use glam::{DVec3, Vec3};
 use std::{collections::HashSet, path::PathBuf};
 
@@ -281,6 +281,10 @@ pub fn apply<S: Editable>(scene: &mut S, edits: &[Edit], context: &Context) -> R
     let mut changes = Vec::new();
     for (at, edit) in edits.iter().enumerate() {
         let before = scene.count() as u64;
+        if let Edit::Move(motion) = edit {
+            let places = (0..scene.count()).map(|index| scene.place(index));
+            motion.check(keep::around(places))?;
+        }
         one(scene, edit, &context.after(&edits[..at]))?;
         changes.push(Change { edit: edit.name(), before, after: scene.count() as u64 });
         check_left(&changes, context)?;

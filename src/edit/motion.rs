@@ -1,6 +1,9 @@
 //! Affine motions of scenes.
 
-use crate::math::eigen;
+use crate::{
+    Error,
+    math::{eigen, keep},
+};
 use glam::{DMat3, DVec3};
 use std::str::FromStr;
 
@@ -57,6 +60,25 @@ impl Motion {
     /// Returns where a point is moved to.
     pub fn place(&self, point: DVec3) -> DVec3 {
         self.linear * point + self.shift
+    }
+
+    /// Checks that a scene in a box keeps its shape, and returns the corners of the box around it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a place where 64 bits do not hold it.
+    pub(crate) fn check(&self, from: [DVec3; 2]) -> Result<[DVec3; 2], Error> {
+        let [low, high] = from;
+        if !(low.cmple(high).all() && (high - low).is_finite()) {
+            return Ok(from);
+        }
+        let corner = |at: usize| {
+            let share = DVec3::from_array([at & 1, at >> 1 & 1, at >> 2].map(|bit| bit as f64));
+            low + share * (high - low)
+        };
+        let to = keep::around((0..8).map(|at| self.place(corner(at))));
+        let sides = [0, 1, 2].map(|axis| self.linear.row(axis).abs().dot(high - low));
+        keep::check_move(from, to, sides.into_iter().fold(0.0, f64::max))?;
+        Ok(to)
     }
 
     /// Returns the linear map.

@@ -194,6 +194,11 @@ impl<'a> Pass<'a> {
         self.streams.first().and_then(Stream::grid).filter(|_| !is_moved)
     }
 
+    /// Returns whether 32-bit floats do not hold the positions of a file.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.streams.iter().any(Stream::is_wide)
+    }
+
     /// Returns the file that is read first.
     pub(crate) fn first(&self) -> Option<&Path> {
         self.streams.first().map(Stream::path)
@@ -215,6 +220,7 @@ impl<'a> Pass<'a> {
     /// # Errors
     /// Those of [`apply`](super::apply), of reading the files, and of `take`.
     pub fn run(&self, mut take: impl FnMut(Records) -> Result<()>) -> Result<Vec<Change>> {
+        self.check_moves()?;
         let mut steps: Vec<Step> = Vec::new();
         for edit in self.edits {
             let step = match edit {
@@ -236,6 +242,21 @@ impl<'a> Pass<'a> {
             .collect();
         check_left(&changes, &self.context)?;
         Ok(changes)
+    }
+
+    /// Checks that the moves before a map keep the shape of each file's points.
+    fn check_moves(&self) -> Result<()> {
+        for stream in &self.streams {
+            let mut ends = stream.bounds().map(|corner| stream.origin() + corner.as_dvec3());
+            for edit in self.edits {
+                match edit {
+                    Edit::Move(motion) => ends = motion.check(ends)?,
+                    Edit::Reproject(_) => break,
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Decides an edit for which all points that arrive at it must be known.

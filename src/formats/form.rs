@@ -171,6 +171,11 @@ pub(super) trait Form: Send + Sync {
         None
     }
 
+    /// Returns whether 32-bit floats do not hold the positions.
+    fn is_wide(&self) -> bool {
+        self.grid().is_some()
+    }
+
     /// Returns whether the colours are greys that stand for another attribute.
     fn are_greys(&self) -> bool {
         false

@@ -16,10 +16,22 @@ pub(crate) struct PointLayout {
     pub bounds: [DVec3; 2],
     /// The steps and the offset of positions that are whole numbers, if the points have such.
     pub grid: Option<[DVec3; 2]>,
+    /// Whether an input has coordinates that 32-bit floats do not hold.
+    pub is_wide: bool,
     /// A file whose coordinate reference system is kept, if the format can hold it.
     pub crs: Option<std::path::PathBuf>,
     /// The EPSG code of the coordinate reference system, and whether that is geographic.
     pub code: Option<(u16, bool)>,
+}
+
+impl PointLayout {
+    /// Returns whether floats of 32 bits would lose some of the coordinates.
+    pub(super) fn needs_64_bits(&self) -> bool {
+        let [low, high] = self.bounds;
+        let farthest = low.abs().max(high.abs()).max_element();
+        let is_far = farthest > 2.0 * (high - low).max_element() || farthest > f32::MAX.into();
+        self.is_wide || self.grid.is_some() || is_far
+    }
 }
 
 /// A file of points that is being written. It appears once it is finished.

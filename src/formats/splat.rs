@@ -7,7 +7,7 @@
 //! large and opaque Gaussians first, so that a viewer can show them before the rest is there; the
 //! order means nothing else.
 
-use super::shared::trained::{Trained, settle};
+use super::shared::trained::{Trained, check_places, settle};
 use crate::{
     Error, Result, disk,
     gaussians::{
@@ -15,6 +15,7 @@ use crate::{
         harmonics::{CONSTANT, constant_of},
     },
     input::Source,
+    math::keep::single,
 };
 use glam::{Quat, Vec3};
 use std::{io::Write, path::Path};
@@ -69,10 +70,11 @@ fn decode(record: &[u8; RECORD]) -> (Trained, [f32; 3]) {
 /// is kept, from 0 to 1. Colours, opacities and rotations are rounded to 8 bits.
 ///
 /// # Errors
-/// [`Error::Argument`] for a set that is empty or contradicts itself; [`Error::Output`] if the file
-/// cannot be written.
+/// [`Error::Argument`] for a set that is empty, contradicts itself, or is so far away that 32 bits
+/// do not hold its shape; [`Error::Output`] if the file cannot be written.
 pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     set.validate().map_err(Error::Argument)?;
+    check_places(".splat", set, single)?;
     if set.is_empty() {
         return Err(Error::Argument("there are no Gaussians to write".into()));
     }

@@ -386,6 +386,11 @@ impl<'a> Stream<'a> {
         self.form.grid()
     }
 
+    /// Returns whether 32-bit floats do not hold the positions.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.form.is_wide()
+    }
+
     /// Returns whether the colours are greys that stand for another attribute.
     pub(crate) fn are_greys(&self) -> bool {
         self.form.are_greys()

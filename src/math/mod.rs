@@ -8,6 +8,7 @@ mod eigen;
 mod factor;
 mod fit;
 pub(crate) mod hull;
+pub(crate) mod keep;
 mod kernel;
 mod matrices;
 pub(crate) mod neighbours;

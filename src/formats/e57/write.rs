@@ -10,6 +10,7 @@ use crate::{
         Attribute, NumberType, Records,
         points::{PointLayout, PointWriter, columns},
     },
+    math::keep::Keeper,
     warning,
 };
 use ::e57::{E57Writer, RawValues, Record, RecordDataType, RecordName, RecordValue};
@@ -67,6 +68,19 @@ impl Kind {
         }
     }
 
+    /// Returns what is left of a number.
+    fn stored(self, value: f64) -> f64 {
+        match self.value(value) {
+            RecordValue::Single(single) => single.into(),
+            RecordValue::Double(double) => double,
+            RecordValue::Integer(whole) => whole as f64,
+            RecordValue::ScaledInteger(steps) => match self {
+                Self::Steps { size, offset, .. } => steps as f64 * size + offset,
+                _ => f64::NAN,
+            },
+        }
+    }
+
     fn value(self, value: f64) -> RecordValue {
         match self {
             Self::Single => RecordValue::Single(value as f32),
@@ -85,6 +99,7 @@ impl Kind {
 /// The records of a point, in their order.
 struct Shape {
     axes: [Kind; 3],
+    keeper: Keeper,
     /// Colours have 8 bits, because some readers take no others.
     has_colors: bool,
     intensity: Option<(Attribute, Kind)>,
@@ -95,6 +110,7 @@ impl Shape {
         let intensity = layout.attributes.iter().find(|attribute| attribute.name == INTENSITY);
         Self {
             axes: axes(layout),
+            keeper: Keeper::new("E57", layout.bounds),
             has_colors: layout.has_colors,
             intensity: intensity.map(|attribute| (attribute.clone(), Kind::of(attribute.kind))),
         }
@@ -126,7 +142,11 @@ impl Shape {
 
     /// Returns the values of points, in the order of the records. Missing intensities are 0 among
     /// whole numbers.
-    fn values(&self, records: &Records) -> Vec<RawValues> {
+    fn values(&self, records: &Records) -> Result<Vec<RawValues>> {
+        for place in &records.positions {
+            let stored = [0, 1, 2].map(|axis| self.axes[axis].stored(place[axis]));
+            self.keeper.check(*place, DVec3::from_array(stored) - *place)?;
+        }
         let column = self.intensity.as_ref().and_then(|(attribute, _)| {
             columns(records, std::slice::from_ref(attribute)).pop().flatten()
         });
@@ -142,7 +162,7 @@ impl Shape {
             }
             values
         };
-        records.positions.iter().enumerate().map(point).collect()
+        Ok(records.positions.iter().enumerate().map(point).collect())
     }
 }
 
@@ -151,9 +171,7 @@ impl Shape {
 fn axes(layout: &PointLayout) -> [Kind; 3] {
     let [low, high] = layout.bounds;
     let Some([size, offset]) = layout.grid else {
-        let farthest = low.abs().max(high.abs()).max_element();
-        let is_wide = farthest > 2.0 * (high - low).max_element();
-        return [if is_wide { Kind::Double } else { Kind::Single }; 3];
+        return [if layout.needs_64_bits() { Kind::Double } else { Kind::Single }; 3];
     };
     [0, 1, 2].map(|axis| {
         let steps = |place: f64| (place - offset[axis]) / size[axis];
@@ -241,7 +259,7 @@ impl Writer {
 
 impl PointWriter for Writer {
     fn put(&mut self, records: &Records) -> Result<()> {
-        let values = self.shape.values(records);
+        let values = self.shape.values(records)?;
         self.count += values.len() as u64;
         let sent = self.points.as_ref().map(|points| points.send(values));
         // The thread is gone only after an error.

@@ -15,6 +15,7 @@ use crate::{
     Error, Result,
     disk::AtomicFile,
     input::{Limits, Source},
+    math::keep::Keeper,
 };
 use glam::DVec3;
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder, laszip::LazItemRecordBuilder};
@@ -121,6 +122,7 @@ struct Shape {
     has_colors: bool,
     /// The steps and the offset of positions.
     grid: [DVec3; 2],
+    keeper: Keeper,
     /// Records before the points, each with its user, its number and its bytes.
     records: Vec<(&'static str, u16, Vec<u8>)>,
     is_packed: bool,
@@ -214,8 +216,8 @@ impl Shape {
         if !extra.is_empty() {
             records.push(("LASF_Spec", 4, extra));
         }
-        let grid = grid(&layout);
-        Ok(Self { layout, fields, has_colors, grid, records, is_packed })
+        let (grid, keeper) = (grid(&layout), Keeper::new("LAS", layout.bounds));
+        Ok(Self { layout, fields, has_colors, grid, keeper, records, is_packed })
     }
 
     /// Returns the number of a point's extra bytes.
@@ -299,6 +301,7 @@ impl Shape {
                 )));
             }
             let stored = steps * scale + offset;
+            self.keeper.check(*place, stored - *place)?;
             seen.bounds = [seen.bounds[0].min(stored), seen.bounds[1].max(stored)];
             bytes.extend(steps.to_array().map(|step| (step as i32).to_le_bytes()).as_flattened());
             bytes.resize(start + POINT + if self.has_colors { COLOR } else { 0 }, 0);

@@ -335,6 +335,13 @@ impl Form for Pieces {
         Ok(records)
     }
 
+    fn is_wide(&self) -> bool {
+        let coordinates = self.vertices.fields[POSITION..].iter().take(3).flatten();
+        coordinates.into_iter().any(|(_, kind)| {
+            matches!(kind, ScalarType::Double | ScalarType::Int | ScalarType::UInt)
+        })
+    }
+
     fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
         self.triangle_piece(source, piece)
     }

@@ -1,6 +1,10 @@
 //! Writes PLY: binary, little-endian.
 
-use crate::{Error, Result, disk, surface::Mesh};
+use crate::{
+    Error, Result, disk,
+    math::keep::{self, Keeper},
+    surface::Mesh,
+};
 use glam::DVec3;
 use std::{io::Write, path::Path};
 
@@ -22,7 +26,7 @@ pub fn value_name(mesh: &Mesh) -> String {
 ///
 /// # Errors
 /// [`Error::Output`] if the file cannot be written; [`Error::Argument`] for attributes whose number
-/// does not match the positions.
+/// does not match the positions, and for positions that the file rounds too much.
 pub fn write(mesh: &Mesh, path: impl AsRef<Path>) -> Result<()> {
     let count = mesh.positions.len();
     let lists = [
@@ -38,12 +42,24 @@ pub fn write(mesh: &Mesh, path: impl AsRef<Path>) -> Result<()> {
             )));
         }
     }
+    let ends = keep::around(mesh.positions.iter().map(|place| place.as_dvec3()));
+    let keeper = Keeper::new("PLY", ends);
+    mesh.positions.iter().map(|place| place.as_dvec3()).try_for_each(|place| {
+        let there = mesh.origin + place;
+        let written = if is_far(mesh) { there } else { keep::single(there) };
+        keeper.check(there, (written - mesh.origin) - place)
+    })?;
     disk::write_with(path.as_ref(), |out| write_to(mesh, out))
+}
+
+/// Returns whether positions have 64 bits.
+fn is_far(mesh: &Mesh) -> bool {
+    mesh.origin != DVec3::ZERO
 }
 
 fn write_to(mesh: &Mesh, out: &mut impl Write) -> std::io::Result<()> {
     write_header(mesh, out)?;
-    let is_far = mesh.origin != DVec3::ZERO;
+    let is_far = is_far(mesh);
     for (index, position) in mesh.positions.iter().enumerate() {
         match is_far {
             true => out.write_all(bytemuck::bytes_of(
@@ -70,7 +86,7 @@ fn write_to(mesh: &Mesh, out: &mut impl Write) -> std::io::Result<()> {
 
 fn write_header(mesh: &Mesh, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.positions.len())?;
-    let kind = if mesh.origin == DVec3::ZERO { "float" } else { "double" };
+    let kind = if is_far(mesh) { "double" } else { "float" };
     writeln!(out, "property {kind} x\nproperty {kind} y\nproperty {kind} z")?;
     if !mesh.normals.is_empty() {
         writeln!(out, "property float nx\nproperty float ny\nproperty float nz")?;

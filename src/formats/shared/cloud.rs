@@ -93,10 +93,14 @@ pub(crate) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
     colors.par_iter().map(|&color| color_of_16_bits(color, largest)).collect()
 }
 
-/// Converts one 16-bit colour, given the largest value of nearly all colours.
+/// Converts one 16-bit colour, given the largest value of nearly all colours. Some programs shift
+/// bytes to 16 bits: 65280 is white then.
 pub(crate) fn color_of_16_bits(color: [u16; 3], largest: u16) -> [u8; 4] {
+    let is_shifted = color.iter().all(|value| value & 255 == 0);
     let byte = |value: u16| {
-        if largest > 255 {
+        if largest > 255 && is_shifted {
+            (value >> 8) as u8
+        } else if largest > 255 {
             ((u32::from(value) * 255 + 32767) / 65535) as u8
         } else {
             value.min(255) as u8
@@ -144,6 +148,15 @@ mod tests {
             colors_of_16_bits(&[[0, 0x8080, 0xffff], [255, 256, 0]]),
             [[0, 128, 255, 255], [1, 1, 0, 255]]
         );
+        // Bytes times 257 and bytes times 256 are exact.
+        for factor in [257, 256] {
+            let bytes = [[0, 128, 255], [254, 200, 129]];
+            let wide = bytes.map(|color| color.map(|byte| factor * byte));
+            assert_eq!(
+                colors_of_16_bits(&wide),
+                bytes.map(|[r, g, b]| [r as u8, g as u8, b as u8, 255])
+            );
+        }
         assert!(colors_of_16_bits(&[[0; 3]; 4]).is_empty());
         let mut colors = vec![[0, 128, 255]; 500];
         colors.push([9, 9, 40_000]);

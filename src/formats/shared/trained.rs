@@ -4,6 +4,7 @@ use crate::{
     Result,
     gaussians::{Broken, Gaussians, harmonics::terms},
     input::{Source, positions},
+    math::keep::{Keeper, around},
     parallel::prelude::*,
     warning,
 };
@@ -146,6 +147,22 @@ fn leave_out_broken(
     Ok(broken)
 }
 
+/// Checks that a format keeps where Gaussians are. `stored` returns what becomes of a place.
+///
+/// # Errors
+/// [`Error::Argument`](crate::Error::Argument) for a set that is too far away.
+pub(crate) fn check_places(
+    format: &'static str,
+    set: &Gaussians,
+    stored: impl Fn(DVec3) -> DVec3 + Sync,
+) -> Result<()> {
+    let keeper = Keeper::new(format, around(set.centers.iter().map(|at| at.as_dvec3())));
+    set.centers.par_iter().try_for_each(|center| {
+        let (center, place) = (center.as_dvec3(), set.origin + center.as_dvec3());
+        keeper.check(place, (stored(place) - set.origin) - center)
+    })
+}
+
 /// Returns the opacity of a logit. ±∞ are 0 and 1.
 pub(crate) fn opacity_of_logit(logit: f32) -> f32 {
     (1.0 / (1.0 + (-f64::from(logit)).exp())) as f32
@@ -160,7 +177,7 @@ pub(crate) fn logit_of_opacity(opacity: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::Limits;
+    use crate::{input::Limits, math::keep::single};
     use std::path::Path;
 
     #[test]
@@ -222,6 +239,20 @@ mod tests {
         let source = Source::from_bytes(Path::new("a.ply"), &[], &limits).unwrap();
         let error = settle(&source, 10, 0, |i, _| Ok(one(i + 2))).unwrap_err().to_string();
         assert!(error.contains("the reading time in seconds"), "{error}");
+    }
+
+    #[test]
+    fn sets_are_checked_around_their_origin() {
+        let centers = vec![Vec3::ZERO, Vec3::new(1.0, 0.33, 0.7)];
+        for (far, is_kept) in [(0.0, true), (1e4, true), (1e7, false), (1e20, false), (1e39, false)]
+        {
+            let set = Gaussians {
+                origin: DVec3::splat(far),
+                centers: centers.clone(),
+                ..Gaussians::default()
+            };
+            assert_eq!(check_places("this", &set, single).is_ok(), is_kept, "{far}");
+        }
     }
 
     #[test]

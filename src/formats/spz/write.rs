@@ -6,7 +6,7 @@ use super::{
 };
 #[cfg(feature = "files")]
 use crate::parallel::prelude::*;
-use crate::{Error, Result, disk, gaussians::Gaussians};
+use crate::{Error, Result, disk, formats::shared::trained::check_places, gaussians::Gaussians};
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Quat};
 use std::{
@@ -32,7 +32,7 @@ const LEVEL: i32 = 12;
 ///
 /// # Errors
 /// [`Error::Argument`] for a set that is empty, contradicts itself, or has positions beyond
-/// 8 388 607; [`Error::Output`] if the file cannot be written.
+/// 8 388 607 or that would be rounded too much; [`Error::Output`] if the file cannot be written.
 pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     let (count, fraction) = checked(set)?;
     disk::write_with(path.as_ref(), |out| {
@@ -88,7 +88,10 @@ fn checked(set: &Gaussians) -> Result<(u32, u8)> {
     if count == 0 {
         return Err(Error::Argument("there are no Gaussians to write".into()));
     }
-    Ok((count as u32, fraction(set)?))
+    let fraction = fraction(set)?;
+    let steps = f64::from(fraction).exp2();
+    check_places("SPZ", set, |place| (place * steps).round() / steps)?;
+    Ok((count as u32, fraction))
 }
 
 /// Returns the fields of the header that all versions have.

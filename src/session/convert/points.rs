@@ -16,6 +16,7 @@ use crate::{
         Attribute, Kind, NumberType, PointLayout, PointWriter, Records, Stream, write_points,
     },
     hierarchy::external::memory_of_mesh,
+    math::keep,
     progress,
     surface::Mesh,
 };
@@ -41,6 +42,7 @@ impl<W: Watch> Work<'_, W> {
             has_colors,
             bounds: pass.bounds(),
             grid: pass.grid(),
+            is_wide: pass.is_wide(),
             crs: pass.first().map(Path::to_owned).filter(|_| pass.crs().is_none()),
             code: pass.crs().and_then(code_of),
             attributes: attributes.clone(),
@@ -208,6 +210,7 @@ impl<W: Watch> Work<'_, W> {
             has_colors: has_colors || pass.has_greys(),
             bounds: pass.bounds(),
             grid: None,
+            is_wide: false,
             crs: None,
             code: None,
         };
@@ -327,6 +330,7 @@ fn layout_of(parts: &[Records]) -> PointLayout {
     for part in parts {
         for place in &part.positions {
             layout.bounds = [layout.bounds[0].min(*place), layout.bounds[1].max(*place)];
+            layout.is_wide |= keep::single(*place) != *place;
         }
         for attribute in &part.attributes {
             if !layout.attributes.iter().any(|known| known.name == attribute.name) {

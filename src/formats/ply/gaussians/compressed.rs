@@ -15,13 +15,14 @@ use crate::{
     Error, Result, disk,
     formats::shared::{
         curve::order,
-        trained::{Trained, settle},
+        trained::{Trained, check_places, settle},
     },
     gaussians::{
         Gaussians,
         harmonics::{CONSTANT, constant_of, terms},
     },
     input::Source,
+    math::keep::single,
     memory,
 };
 use glam::{DVec3, Quat, Vec3};
@@ -256,6 +257,7 @@ fn word_of_rotation(rotation: Quat) -> u32 {
 /// order does not fit in memory; [`Error::Output`] if the file cannot be written.
 pub fn write_compressed_gaussians(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     set.validate().map_err(Error::Argument)?;
+    check_places("compressed PLY", set, single)?;
     memory::room("sorting Gaussians", (size_of::<(u64, usize)>() * set.len()) as u64)?;
     let order = order(set);
     disk::write_with(path.as_ref(), |out| {

@@ -3,8 +3,9 @@
 use super::log_of_scale;
 use crate::{
     Error, Result, disk,
-    formats::shared::trained::logit_of_opacity,
+    formats::shared::trained::{check_places, logit_of_opacity},
     gaussians::{Gaussians, harmonics::terms},
+    math::keep::single,
 };
 use std::{io::Write, path::Path};
 
@@ -18,10 +19,11 @@ const BEHIND: [&str; 8] =
 /// coordinates.
 ///
 /// # Errors
-/// [`Error::Argument`] if the set is not valid ([`Gaussians::validate`]); [`Error::Output`] if the
-/// file cannot be written.
+/// [`Error::Argument`] if the set is not valid ([`Gaussians::validate`]), or so far away that 32
+/// bits do not hold its shape; [`Error::Output`] if the file cannot be written.
 pub fn write_gaussians(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     set.validate().map_err(Error::Argument)?;
+    check_places("PLY", set, single)?;
     disk::write_with(path.as_ref(), |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", set.len())?;
         let rest = (0..3 * (terms(set.degree) - 1)).map(|number| format!("f_rest_{number}"));
