@@ -11,8 +11,9 @@ mod webp;
 use super::{ENTRIES_IN_ROW, FIRST_TAG, META};
 use crate::{
     Error, Result, disk,
-    formats::shared::curve,
+    formats::shared::{curve, trained::check_places},
     gaussians::{Gaussians, harmonics::terms},
+    math::keep::single,
     memory,
     parallel::prelude::*,
 };
@@ -22,7 +23,7 @@ use palette::Palette;
 use serde_json::{Value, json};
 use std::{
     f32::consts::FRAC_1_SQRT_2,
-    io::{self, Write},
+    io::{self, Seek, Write},
     path::Path,
 };
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
@@ -50,11 +51,13 @@ type Named = (&'static str, Vec<u8>);
 /// to 65,536 rows, of 256 numbers. The order changes.
 ///
 /// # Errors
-/// [`Error::Argument`] for a set that is empty, contradicts itself, or is too large for a plane;
+/// [`Error::Argument`] for a set that is empty, contradicts itself, is too large for a plane, or so
+/// far away that 32 bits do not hold its shape;
 /// [`Error::Memory`] if there is too little of it; [`Error::Output`] if a file cannot be written.
 pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     set.validate().map_err(Error::Argument)?;
+    check_places("SOG", set, single)?;
     if set.is_empty() {
         return Err(Error::Argument("there are no Gaussians to write".into()));
     }
@@ -65,17 +68,25 @@ pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     if path.file_name().is_some_and(|name| name == META) {
         return write_beside(path, &meta, &planes);
     }
-    disk::write_with(path, |out| {
-        let mut archive = ZipWriter::new(out);
-        let plain = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-        for (name, bytes) in [(META, &meta)].into_iter().chain(planes.iter().map(|(n, b)| (*n, b)))
-        {
-            archive.start_file(name, plain)?;
-            archive.write_all(bytes)?;
-        }
-        archive.finish()?;
-        Ok(())
-    })
+    disk::write_with(path, |out| archive(&meta, &planes, out))
+}
+
+/// Writes an archive.
+fn archive(meta: &Vec<u8>, planes: &[Named], out: impl Write + Seek) -> io::Result<()> {
+    let mut archive = ZipWriter::new(out);
+    let plain = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+    let mut files = [(META, meta)].into_iter().chain(planes.iter().map(|(n, b)| (*n, b)));
+    let written = files.try_for_each(|(name, bytes)| {
+        archive.start_file(name, plain)?;
+        archive.write_all(bytes)
+    });
+    if let Err(error) = written {
+        // To drop it would end the archive, fail once more, and say so on the terminal.
+        std::mem::forget(archive);
+        return Err(error);
+    }
+    archive.finish()?;
+    Ok(())
 }
 
 /// Writes a `meta.json` and planes beside it. They appear once all of them are whole, the

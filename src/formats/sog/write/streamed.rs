@@ -4,7 +4,13 @@
 //! Gaussians in a file of each level. A file holds those of neighbouring leaves.
 
 use super::{META, Named, Size, pack, place, write_beside};
-use crate::{Error, Result, disk, formats::shared::curve, gaussians::Gaussians, memory};
+use crate::{
+    Error, Result, disk,
+    formats::shared::{curve, trained::check_places},
+    gaussians::Gaussians,
+    math::keep::single,
+    memory,
+};
 use glam::DVec3;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -37,6 +43,7 @@ pub fn write(levels: &[Gaussians], path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     for level in levels {
         level.validate().map_err(Error::Argument)?;
+        check_places("SOG", level, single)?;
     }
     if levels.is_empty() || levels.iter().any(Gaussians::is_empty) {
         return Err(Error::Argument("there are no Gaussians to write".into()));
@@ -60,11 +67,45 @@ pub fn write(levels: &[Gaussians], path: impl AsRef<Path>) -> Result<()> {
         tree,
     };
     let text = serde_json::to_vec(&index).map_err(|error| Error::output(path, error.into()))?;
+    let before = folders_of(path);
     let mut written = Written(Vec::new());
     files.write(path, &mut written)?;
     disk::write(path, &text)?;
     written.0.clear();
+    let is_old = |name: &&String| !files.files.iter().any(|chunk| chunk.folder() == **name);
+    before.iter().filter(is_old).for_each(|name| remove(&disk::folder(path).join(name)));
     Ok(())
+}
+
+/// Most bytes of an index whose folders are removed when it is replaced.
+const MOST_INDEX: u64 = 1 << 26;
+
+/// Returns the folders of Gaussians beside an index that is there, by their names.
+fn folders_of(index: &Path) -> Vec<String> {
+    let is_short = fs::metadata(index).is_ok_and(|meta| meta.len() <= MOST_INDEX);
+    let text = is_short.then(|| fs::read_to_string(index).ok()).flatten().unwrap_or_default();
+    let value: Value = serde_json::from_str(&text).unwrap_or_default();
+    let names = value["filenames"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    // Names as they are written here, which lead nowhere else.
+    let of_level = |folder: &&str| {
+        folder.split_once('_').is_some_and(|(level, number)| is_number(level) && is_number(number))
+    };
+    let folders = names.filter_map(|name| name.strip_suffix(META)?.strip_suffix('/'));
+    folders.filter(of_level).map(str::to_owned).collect()
+}
+
+/// Removes a folder of Gaussians, unless other files are there.
+fn remove(folder: &Path) {
+    let is_plain = folder.symlink_metadata().is_ok_and(|meta| meta.is_dir());
+    let Some(entries) = is_plain.then(|| fs::read_dir(folder).ok()).flatten() else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let is_plane = path.extension().is_some_and(|extension| extension == "webp");
+        if is_plane || path.file_name().is_some_and(|name| name == META) {
+            let _ = fs::remove_file(path);
+        }
+    }
+    let _ = fs::remove_dir(folder);
 }
 
 /// What an index says. The number of levels, by which it is known, comes early.
@@ -323,6 +364,32 @@ mod tests {
         let index: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(index["tree"]["lods"]["0"]["count"], 40_000);
         assert_eq!(read_with(&path, read).unwrap().len(), 40_000);
+    }
+
+    #[test]
+    fn a_replaced_scene_leaves_no_levels() {
+        let folder = Folder::new();
+        let path = folder.path(INDEX);
+        write(&[square(30, 1.0), square(20, 0.6), square(10, 0.2)], &path).unwrap();
+        // Files of others stay.
+        let put = |name: &str| {
+            let file = folder.path(name);
+            fs::create_dir_all(disk::folder(&file)).unwrap();
+            fs::write(file, "mine").unwrap();
+        };
+        ["1_0/notes.txt", "3_0/meta.json", "mine/meta.json"].into_iter().for_each(put);
+        write(&[square(3, 1.0)], &path).unwrap();
+        assert!(folder.path("0_0/meta.json").exists() && !folder.path("2_0").exists());
+        let left: Vec<_> = fs::read_dir(folder.path("1_0")).unwrap().flatten().collect();
+        assert_eq!(left.len(), 1);
+        assert!(folder.path("1_0/notes.txt").exists() && folder.path("3_0/meta.json").exists());
+        assert_eq!(read_with(&path, read).unwrap().len(), 9);
+        // An index that leads elsewhere removes nothing there.
+        let names = json!({ "filenames": ["mine/meta.json", "../0_0/meta.json", "0_0/x.json", 3] });
+        folder.write(INDEX, names.to_string());
+        assert_eq!(folders_of(&path), [""; 0]);
+        write(&[square(3, 1.0)], &path).unwrap();
+        assert!(folder.path("mine/meta.json").exists());
     }
 
     #[test]

@@ -125,3 +125,42 @@ fn rotations_are_those_that_are_read() {
         assert_eq!(rotation(-turn), bytes);
     }
 }
+
+/// A disk that is full after some bytes.
+struct Full {
+    left: usize,
+    /// How often more was written after that.
+    knocks: usize,
+}
+
+impl Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if bytes.len() > self.left {
+            self.knocks += 1;
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        self.left -= bytes.len();
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Full {
+    fn seek(&mut self, _: io::SeekFrom) -> io::Result<u64> {
+        Ok(0)
+    }
+}
+
+#[test]
+fn an_archive_that_does_not_fit_is_left_as_it_is() {
+    let planes: Vec<Named> = vec![("a.webp", vec![1; 1000]), ("b.webp", vec![2; 1000])];
+    for left in [0, 50, 500, 1500] {
+        let mut full = Full { left, knocks: 0 };
+        let error = archive(&b"{}".to_vec(), &planes, &mut full).unwrap_err();
+        // Once: the archive is not ended after that, which would print what went wrong.
+        assert_eq!((error.kind(), full.knocks), (io::ErrorKind::StorageFull, 1), "{left}");
+    }
+}
