@@ -332,3 +332,85 @@ fn edits_are_read_by_name() {
         assert!(message.contains(word), "{name} {value}: {message}");
     }
 }
+
+#[test]
+fn scenes_do_not_move_where_64_bits_lose_them() {
+    let folder = Folder::new();
+    let (scan, path) = (sheet(20), folder.path("a.points.ply"));
+    write(&path, &scan);
+    for (by, is_kept) in [("1e6,0,0", true), ("1e20,0,0", false), ("1e39,0,0", false)] {
+        let edits = edits(&[("translate", by)]);
+        let message = |result: Result<Vec<Change>>| result.err().map(|error| error.to_string());
+        let whole = message(apply(&mut scan.clone(), &edits, &Context::default()));
+        let set = message(apply(&mut phantom(40, 0), &edits, &Context::default()));
+        let pieces = message(pass(&[&path], &edits, u64::MAX).map(|(_, changes)| changes));
+        for error in [whole, set, pieces] {
+            let is_said = error.as_ref().is_some_and(|text| text.contains("is moved to"));
+            assert_eq!((error.is_none(), is_said), (is_kept, !is_kept), "{by}: {error:?}");
+        }
+    }
+}
+
+#[test]
+fn a_quarter_of_a_trained_scene_looks_like_the_whole() {
+    use crate::{
+        Device, Renderer,
+        compare::compare_pictures,
+        math::{Bounds, Camera},
+        scene::{Scene, Settings},
+    };
+    let set = phantom(8000, 3);
+    let bounds = Bounds::around(set.centers.iter().map(|center| center.as_dvec3()));
+    let drawn = |set: &Gaussians, turn: f64| {
+        let direction = DVec3::new(0.6, 0.5, 1.0);
+        let mut camera = Camera::framing(&bounds, direction, DVec3::NEG_Y, 4.0 / 3.0);
+        camera.azimuth(turn);
+        let scene = Scene::new().with_gaussians(set.clone());
+        let mut renderer = Renderer::new(&Device::Cpu, &scene).expect("a renderer");
+        renderer.render(&camera, &Settings::new([160, 120])).expect("a picture").0
+    };
+    let mut thinned = set.clone();
+    apply(&mut thinned, &edits(&[("thin", "25%")]), &Context::default()).unwrap();
+    assert_eq!(thinned.len(), 2000);
+    for turn in [0.0, 120.0, 240.0] {
+        let compared = compare_pictures(&drawn(&set, turn), &drawn(&thinned, turn)).unwrap();
+        let psnr = compared.psnr.expect("a difference");
+        println!("{turn}°: {psnr:.1} dB");
+        assert!(psnr >= 25.0, "{turn}°: {psnr:.1} dB");
+    }
+}
+
+#[test]
+fn formats_refuse_what_they_would_ruin() {
+    use crate::formats::{gltf, ply, sog, splat, spz};
+    type Write = fn(&Gaussians, &Path) -> Result<()>;
+    let folder = Folder::new();
+    let writers: [(&str, Write, bool); 7] = [
+        ("a.ply", |set, path| ply::write_gaussians(set, path), false),
+        ("a.compressed.ply", |set, path| ply::write_compressed_gaussians(set, path), false),
+        ("a.splat", |set, path| splat::write(set, path), false),
+        ("a.spz", |set, path| spz::write(set, path), false),
+        ("a.sog", |set, path| sog::write(set, path), false),
+        ("lod-meta.json", |set, path| sog::write_streamed(std::slice::from_ref(set), path), false),
+        // Its nodes hold an origin.
+        ("a.glb", |set, path| gltf::write_gaussians(set, path), true),
+    ];
+    let far = Gaussians { origin: DVec3::X * 1e6, ..phantom(40, 0) };
+    for (name, write, holds_far) in writers {
+        let path = folder.path(name);
+        let error = write(&far, &path).err().map(|error| error.to_string());
+        let is_said = error.as_ref().is_some_and(|text| text.contains("would round the position"));
+        assert_eq!((is_said, path.exists()), (!holds_far, holds_far), "{name}: {error:?}");
+        write(&phantom(40, 0), &path).unwrap();
+    }
+    // Steps that are far coarser than the points.
+    let grid = Some([DVec3::ONE, DVec3::ZERO]);
+    let positions = vec![DVec3::ZERO, DVec3::splat(9.5)];
+    let records = Records { positions, ..Records::default() };
+    for name in ["a.las", "a.laz", "a.e57"] {
+        let layout = PointLayout { grid, ..layout(&records) };
+        let mut writer = write_points(&folder.path(name), layout).unwrap();
+        let error = writer.put(&records).unwrap_err().to_string();
+        assert!(error.contains("would round the position"), "{name}: {error}");
+    }
+}
