@@ -4,9 +4,9 @@
 //! usual distance around either, or if they reach each other. A cluster of few points far from all
 //! others is a floater.
 //!
-//! Strays that are evenly scattered have each other as neighbours, at a distance that is usual among
-//! them. So what is usual around nearly all points bounds how far points are joined. Nearly all: the
-//! parts of a scan that are far from its scanner are sparse.
+//! Strays that are evenly scattered have each other as neighbours, at a distance that is usual
+//! among them. So what is usual around nearly all points bounds how far points are joined. Nearly
+//! all: the parts of a scan that are far from its scanner are sparse.
 
 use super::Context;
 use crate::{Error, Result, math::neighbours::Neighbours, parallel::prelude::*};
