@@ -51,9 +51,9 @@ type Named = (&'static str, Vec<u8>);
 /// to 65,536 rows, of 256 numbers. The order changes.
 ///
 /// # Errors
-/// [`Error::Argument`] for a set that is empty, contradicts itself, is too large for a plane, or so
-/// far away that 32 bits do not hold its shape;
-/// [`Error::Memory`] if there is too little of it; [`Error::Output`] if a file cannot be written.
+/// [`Error::Argument`] for a set that is empty, contradicts itself, or is too large for a plane;
+/// also for one so far away that 32 bits do not hold its shape. [`Error::Memory`] if there is too
+/// little of it; [`Error::Output`] if a file cannot be written.
 pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     set.validate().map_err(Error::Argument)?;
