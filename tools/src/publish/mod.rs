@@ -227,7 +227,7 @@ impl Target {
         if is_json {
             let mut files = serde_json::Map::new();
             for (name, content) in page.files() {
-                files.insert(name.clone(), content.len()?.into());
+                files.insert(name.clone(), content.size()?.into());
             }
             return output::json(&serde_json::json!({
                 "output": self.path().to_string_lossy(),

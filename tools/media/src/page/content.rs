@@ -42,7 +42,7 @@ impl Content {
     ///
     /// # Errors
     /// For a file that is gone.
-    pub fn len(&self) -> Result<u64, Failure> {
+    pub fn size(&self) -> Result<u64, Failure> {
         match self {
             Self::Held(bytes) => Ok(bytes.len() as u64),
             Self::Kept(path) | Self::Made(path, _) => {
@@ -77,7 +77,7 @@ impl Content {
                 disk::write_with(to, |out| io::copy(&mut from, out).map(drop))?;
             }
         }
-        self.len()
+        self.size()
     }
 }
 

@@ -232,7 +232,7 @@ impl File<'_> {
     }
 
     /// Writes the hierarchy of a mesh, a cloud, Gaussians or a hierarchy.
-    fn hierarchy(&self, path: &PathBuf) -> Result<(), Error> {
+    fn hierarchy(&self, path: &Path) -> Result<(), Error> {
         let scene = self.converter.scene;
         let appearance = scene.appearance_of(self.input);
         let moved = self.input.transform.motion().map(Edit::Move);

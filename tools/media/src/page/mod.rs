@@ -152,7 +152,7 @@ impl Page {
     fn bytes_of_folder(&self, viewer: &Viewer) -> Result<[u64; 2], Failure> {
         let mut sums = [0; 2];
         for (name, content) in self.in_files(viewer)? {
-            let bytes = content.len()?;
+            let bytes = content.size()?;
             sums[0] += bytes;
             sums[1] += if self.files().contains_key(&name) { 0 } else { bytes };
         }

@@ -79,7 +79,7 @@ impl Sources {
                 }
                 Content::Kept(path) | Content::Made(path, _) => {
                     let file = File::open(path).map_err(|source| unread(path, &source))?;
-                    let parts = Parts::new(content.len()?, MOST_HELD);
+                    let parts = Parts::new(content.size()?, MOST_HELD);
                     sources.in_parts.insert(name.into(), parts.clone());
                     sources.files.push((path.clone(), file, parts));
                 }
