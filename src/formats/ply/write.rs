@@ -11,7 +11,7 @@ use std::{io::Write, path::Path};
 /// The property of the radii.
 pub const RADIUS: &str = "radius";
 
-/// Returns the name of the property that [`write`] gives the values of a mesh: their own, without
+/// Returns the name of the property that [`write()`] gives the values of a mesh: their own, without
 /// spaces.
 pub fn value_name(mesh: &Mesh) -> String {
     match mesh.about.name.trim() {
