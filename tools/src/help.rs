@@ -139,7 +139,7 @@ mod tests {
             colormap color nan-color log-colors",
         ),
         ("Kernel", "kernel sigma extent sharp"),
-        ("Page", "title viewer"),
+        ("Page", "title viewer quality limit"),
         ("Animation", "turntable path times fps"),
         ("Figures", "width height dpi views split-channels columns panel-labels"),
         ("Texts", "scalar-bar axes scale-bar caption"),
