@@ -44,3 +44,25 @@ pub fn unpacked(packed: &[u8], count: usize) -> Option<Vec<u8>> {
     LzipReader::new(packed).take(limit).read_to_end(&mut plain).ok()?;
     (plain.len() == count).then_some(plain)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::unpacked;
+
+    /// The word “engine”.
+    const PACKED: [u8; 42] = [
+        0x4c, 0x5a, 0x49, 0x50, 0x01, 0x1a, 0x00, 0x32, 0x9b, 0x89, 0x19, 0xdf, 0xb8, 0x67, 0xcd,
+        0xf9, 0x7f, 0xff, 0xfc, 0xd5, 0xc0, 0x00, 0x8d, 0x1a, 0xa8, 0xe8, 0x06, 0x00, 0x00, 0x00,
+        0x00, 0x00, 0x00, 0x00, 0x2a, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+    ];
+
+    #[test]
+    fn bytes_come_back_or_are_said_to_be_damaged() {
+        assert_eq!(unpacked(&PACKED, 6).as_deref(), Some(&b"engine"[..]));
+        assert!(unpacked(&PACKED, 5).is_none() && unpacked(&PACKED, 7).is_none());
+        assert!(unpacked(&PACKED[..40], 6).is_none() && unpacked(&[], 6).is_none());
+        let mut damaged = PACKED;
+        damaged[22] ^= 1;
+        assert!(unpacked(&damaged, 6).is_none());
+    }
+}
