@@ -403,6 +403,46 @@ tests["what WebGPU does not draw"] = async () => {
   return engines.join(" | ");
 };
 
+tests["a ruler"] = async () => {
+  if (!fs.existsSync(at("mesh.html"))) await tests.mesh();
+  const page = await opened(`file://${at("mesh.html")}`);
+  ended(await rested(page));
+  const viewer = page.locator("splatkit-viewer");
+  // The first and the last place of a row that show the mesh, and their points.
+  const [first, last] = await viewer.evaluate(async (one) => {
+    one.measured = [];
+    one.addEventListener("measure", ({ detail }) => one.measured.push(detail));
+    one.canvas.focus();
+    const places = [];
+    for (let x = 20; x < 620; x += 10) {
+      const point = await one.pointAt(x, 240);
+      if (point) places.push({ x, point });
+    }
+    one.annotations = [{ point: places[0].point, text: "here" }];
+    return [places[0], places.at(-1)];
+  });
+  await page.keyboard.press("m");
+  for (const { x } of [first, last]) {
+    await page.mouse.click(x, 240);
+    await page.waitForTimeout(400);
+  }
+  const length = Math.hypot(...first.point.map((side, axis) => side - last.point[axis]));
+  const [measured] = await viewer.evaluate((one) => one.measured);
+  assert.ok(Math.abs(measured.length - length) < 1e-6, `${measured.length} instead of ${length}`);
+  const marks = () =>
+    viewer.evaluate((one) =>
+      [...one.shadowRoot.querySelectorAll(".marks circle")].map((mark) => Number(mark.getAttribute("cx"))),
+    );
+  const places = await marks();
+  [first.x, last.x, first.x].forEach((x, number) => assert.ok(Math.abs(places[number] - x) < 1, `${places}`));
+  await saved(page, "ruler.png");
+  // M ends it; the annotation stays.
+  await page.keyboard.press("m");
+  assert.equal((await marks()).length, 1);
+  await page.context().close();
+  return `${length.toPrecision(4)} between two clicks`;
+};
+
 tests["a hand"] = async () => {
   if (!fs.existsSync(at("mixed.html"))) await tests.mixed();
   const page = await opened(`file://${at("mixed.html")}`, { colorScheme: "light" });

@@ -36,6 +36,7 @@ export interface SplatkitViewerEventMap {
   frame: CustomEvent<{ width: number; height: number; isExact: boolean; milliseconds: number; workers: number } & Engine>;
   rest: CustomEvent<Record<string, never>>;
   camerachange: CustomEvent<{ camera: Camera }>;
+  measure: CustomEvent<{ points: [number, number, number][]; length: number }>;
   fetched: CustomEvent<{ requests: number; bytes: number; cancelled: number; isBusy: boolean }>;
   error: CustomEvent<{ message: string; isFatal: boolean }>;
 }
@@ -57,6 +58,10 @@ export class SplatkitViewer extends HTMLElement {
   readonly transfers: Part[];
   /** Whether the exact picture is shown. */
   readonly isExact: boolean;
+  /** Texts at points of the world. */
+  annotations: { point: [number, number, number]; text: string }[];
+  /** Begins to measure between two clicks, or ends it. */
+  measure(isMeasuring?: boolean): void;
   /** The canvas, for programs that read its pixels. */
   readonly canvas: HTMLCanvasElement;
   setTransfer(transfer: Part, field?: number): void;

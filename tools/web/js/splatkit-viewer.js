@@ -19,6 +19,11 @@ canvas:focus-visible { outline: 2px solid #4c8dff; }
   white-space: pre-wrap; }
 .help { right: .6rem; top: 2.9rem; margin: 0; max-width: 26rem; }
 .help td:first-child { padding-right: 1rem; font-weight: 600; }
+.marks { position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none; overflow: hidden; }
+.marks line { stroke: #ffd23f; stroke-width: 2; }
+.marks circle { fill: #ffd23f; stroke: #000; }
+.marks text { fill: #fff; stroke: #000; stroke-width: 3; paint-order: stroke; font-size: 13px; }
+canvas.measuring { cursor: crosshair; }
 .tools { position: absolute; right: .6rem; top: .6rem; display: flex; gap: .3rem; }
 button { display: grid; place-items: center; width: 2rem; height: 2rem; padding: 0; border-radius: .4rem; font: inherit;
   color: var(--ink); background: var(--panel); border: 1px solid var(--line); cursor: pointer;
@@ -36,6 +41,7 @@ const HELP = [
   ["1 3 7 0", "front, right, top, a corner"],
   ["Home", "the whole scene"],
   ["O", "perspective on and off"],
+  ["M", "measure between two clicks"],
   ["F", "full screen"],
 ];
 
@@ -44,6 +50,7 @@ const drawn = (path) =>
   `<svg viewBox="0 0 16 16" width="16" height="16" fill="none" stroke="currentColor" stroke-width="1.5" aria-hidden="true"><path d="${path}"/></svg>`;
 const ICONS = {
   whole: drawn("M2 8l6-5.5L14 8M4 7v6.5h8V7"),
+  ruler: drawn("M1.5 11L11 1.5l3.5 3.5L5 14.5zM4.5 8l1.5 1.5M7 5.5L9 7.5M9.5 3L11 4.5"),
   screen: drawn("M2 6V2h4M10 2h4v4M14 10v4h-4M6 14H2v-4"),
   help: drawn("M5.5 6a2.5 2.5 0 1 1 3.6 2.2C8.4 8.6 8 9 8 10M8 12.2v1.3"),
 };
@@ -88,13 +95,81 @@ const IN_PARTS = /\.spl[kv]$/i;
 
 const megabytes = (bytes) => `${(bytes / 1e6).toFixed(1)} MB`;
 
+const difference = (a, b) => a.map((side, axis) => side - b[axis]);
+const product = (a, b) => a.reduce((sum, side, axis) => sum + side * b[axis], 0);
+const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+const unit = (a) => a.map((side) => side / (Math.hypot(...a) || 1));
+
+/** What is drawn over the picture: annotations, and a length that is measured. */
+class Marks {
+  notes = [];
+  /** The ends of the measured length: none, one or two. */
+  ends = [];
+
+  constructor(root) {
+    this.svg = root.appendChild(document.createElementNS("http://www.w3.org/2000/svg", "svg"));
+    this.svg.setAttribute("class", "marks");
+  }
+
+  /** The measured length in world units; null before both ends are set. */
+  get length() {
+    return this.ends.length < 2 ? null : Math.hypot(...difference(...this.ends));
+  }
+
+  /** Draws all for a camera as in scene files. */
+  draw(camera) {
+    this.svg.replaceChildren();
+    if (!camera) return;
+    const places = this.ends.map((point) => this.place(camera, point));
+    if (places.length === 2 && places.every(Boolean)) {
+      const [[x1, y1], [x2, y2]] = places;
+      this.add("line", { x1, y1, x2, y2 });
+      const text = String(Number(this.length.toPrecision(4)));
+      this.add("text", { x: (x1 + x2) / 2 + 6, y: (y1 + y2) / 2 - 6 }, text);
+    }
+    for (const place of places) this.dot(place);
+    for (const { point, text } of this.notes) {
+      const place = this.place(camera, point);
+      this.dot(place);
+      if (place) this.add("text", { x: place[0] + 8, y: place[1] + 4 }, text);
+    }
+  }
+
+  dot(place) {
+    if (place) this.add("circle", { cx: place[0], cy: place[1], r: 4 });
+  }
+
+  add(name, attributes, text = "") {
+    const mark = this.svg.appendChild(document.createElementNS(this.svg.namespaceURI, name));
+    for (const [key, value] of Object.entries(attributes)) mark.setAttribute(key, value);
+    mark.textContent = text;
+  }
+
+  /** Returns where a point of the world is, in pixels of the page; nothing if it is behind. */
+  place(camera, point) {
+    const { clientWidth: width, clientHeight: height } = this.svg.parentNode.host;
+    const forward = unit(difference(camera.focal_point, camera.position));
+    const right = unit(cross(forward, camera.view_up));
+    const way = difference(point, camera.position);
+    const depth = product(way, forward);
+    const isFlat = camera.height != null;
+    if (!isFlat && depth <= 0) return null;
+    const shown = isFlat ? camera.height : 2 * depth * Math.tan((camera.view_angle * Math.PI) / 360);
+    const scale = height / shown;
+    return [width / 2 + product(way, right) * scale, height / 2 - product(way, cross(right, forward)) * scale];
+  }
+}
+
 export class SplatkitViewer extends HTMLElement {
-  static observedAttributes = ["src", "camera", "transfer", "clips", "label", "pixel-ratio"];
+  static observedAttributes = ["src", "camera", "transfer", "clips", "label", "pixel-ratio", "annotations"];
 
   #worker = null;
   /** Workers that draw along. */
   #helpers = [];
   #canvas;
+  #marks;
+  #pressed = null;
+  #isMeasuring = false;
   #context;
   #status;
   #problem;
@@ -126,6 +201,7 @@ export class SplatkitViewer extends HTMLElement {
     this.#canvas = make("canvas", { tabIndex: 0, role: "img" });
     this.#canvas.setAttribute("part", "canvas");
     this.#context = this.#canvas.getContext("2d");
+    this.#marks = new Marks(root);
     this.#status = make("div", { className: "panel status", role: "status", hidden: true });
     this.#problem = make("div", { className: "panel problem", role: "alert", hidden: true });
     const tools = make("div", { className: "tools" });
@@ -135,6 +211,7 @@ export class SplatkitViewer extends HTMLElement {
       one.setAttribute("aria-label", label);
     };
     button(ICONS.whole, "The whole scene (Home)", () => this.fit());
+    button(ICONS.ruler, "Measure between two clicks (M)", () => this.measure());
     button(ICONS.screen, "Full screen (F)", () => this.toggleFullscreen());
     button(ICONS.help, "Help (H)", () => this.#toggleHelp());
     this.#help = make("table", { className: "panel help", hidden: true });
@@ -165,6 +242,7 @@ export class SplatkitViewer extends HTMLElement {
     if (!this.isConnected || before === after) return;
     if (name === "src") this.#openSource();
     else if (name === "label") this.#describe();
+    else if (name === "annotations") this.annotations = JSON.parse(after || "[]");
     else if (name === "pixel-ratio") this.#resize();
     else if (this.#isOpen) this.#applyAttribute(name);
   }
@@ -209,6 +287,34 @@ export class SplatkitViewer extends HTMLElement {
 
   setClips(clips) {
     this.#post({ type: "clips", clips: JSON.stringify(clips) });
+  }
+
+  /** Texts at points of the world: `{ point: [x, y, z], text }`. */
+  get annotations() {
+    return structuredClone(this.#marks.notes);
+  }
+  set annotations(notes) {
+    this.#marks.notes = structuredClone(notes);
+    this.#marks.draw(this.#camera);
+  }
+
+  /** Begins to measure between two clicks, or ends it and removes what was measured. */
+  measure(isMeasuring = !this.#isMeasuring) {
+    this.#isMeasuring = isMeasuring;
+    this.#canvas.classList.toggle("measuring", isMeasuring);
+    this.#marks.ends = [];
+    this.#marks.draw(this.#camera);
+  }
+
+  /** Takes a click as an end of the length that is measured. */
+  async #measureAt(event) {
+    const point = await this.pointAt(event.clientX, event.clientY);
+    if (!point || !this.#isMeasuring) return;
+    const ends = this.#marks.ends;
+    this.#marks.ends = ends.length < 2 ? [...ends, point] : [point];
+    this.#marks.draw(this.#camera);
+    const { length } = this.#marks;
+    if (length !== null) this.#tell("measure", { points: structuredClone(this.#marks.ends), length });
   }
 
   /** Shows the whole scene, from a side (“front”, “top” …) or as at first. */
@@ -397,6 +503,7 @@ export class SplatkitViewer extends HTMLElement {
     const isMoved = camera !== this.#cameraText;
     this.#cameraText = camera;
     this.#camera = JSON.parse(camera);
+    this.#marks.draw(this.#camera);
     this.#sayEngine(engine, reason);
     this.#tell("frame", { width, height, isExact, milliseconds, engine, reason, workers });
     if (isMoved) this.#tell("camerachange", { camera: this.camera });
@@ -466,6 +573,11 @@ export class SplatkitViewer extends HTMLElement {
     const canvas = this.#canvas;
     canvas.addEventListener("pointerdown", (event) => this.#press(event));
     canvas.addEventListener("pointermove", (event) => this.#drag(event));
+    canvas.addEventListener("pointerup", (event) => {
+      const { clientX, clientY } = this.#pressed ?? event;
+      const isClick = Math.hypot(event.clientX - clientX, event.clientY - clientY) < 4;
+      if (this.#isMeasuring && isClick) this.#measureAt(event);
+    });
     for (const end of ["pointerup", "pointercancel"]) {
       canvas.addEventListener(end, (event) => this.#pointers.delete(event.pointerId));
     }
@@ -481,6 +593,7 @@ export class SplatkitViewer extends HTMLElement {
   }
 
   #press(event) {
+    this.#pressed = event;
     this.#canvas.setPointerCapture(event.pointerId);
     this.#pointers.set(event.pointerId, this.#pixel(event));
     const [x, y] = this.#middle();
@@ -545,6 +658,7 @@ export class SplatkitViewer extends HTMLElement {
     } else if (side) this.fit(side);
     else if (key === "home") this.fit();
     else if (key === "o") this.#post({ type: "perspective" });
+    else if (key === "m") this.measure();
     else if (key === "f") this.toggleFullscreen();
     else if (key === "h") this.#toggleHelp();
     else if (FLIES[key]) this.#fly(key);
