@@ -59,6 +59,8 @@ fn a_page_shows_a_part_of_its_inputs() {
     folder.run(&format!("{publish} --limit 100B")).fails(2, &["--limit: the viewer alone has"]);
     folder.run(&format!("{publish} --quality 0%")).fails(2, &["above 0 % and at most 100 %"]);
     folder.run(&format!("{publish} --limit small")).fails(2, &["the units are KiB"]);
+    fs::write(folder.path("viewer/splatkit.wasm.lz"), &ENGINE[..30]).unwrap();
+    folder.run(publish).fails(3, &["splatkit.wasm.lz", "cannot be read"]);
     assert!(!folder.path("b.html").exists());
 }
 

@@ -50,9 +50,7 @@ impl Converter<'_> {
     /// Returns whether less of an input is wanted than it has, and a part can be taken.
     pub fn thins(&self, read: &LoadedInput) -> bool {
         let has_parts = match read.kind {
-            Kind::Mesh | Kind::Gaussians | Kind::Volume => true,
-            // One of surfaces is thinned as it is written again.
-            Kind::Hierarchy => true,
+            Kind::Mesh | Kind::Gaussians | Kind::Volume | Kind::Hierarchy => true,
             Kind::Samples | Kind::Cells | Kind::Bricks => false,
         };
         self.wanted.share < 1.0 && has_parts && !read.has_lines
@@ -96,8 +94,8 @@ impl Converter<'_> {
     ) -> Result<Vec<Entry>, Failure> {
         let thin = self.thins(read).then_some(self.wanted.share);
         let mut wanted = input.clone();
-        let is_surfels = read.kind == Kind::Hierarchy;
-        if let (Some(share), false) = (thin, is_surfels || read.kind == Kind::Volume) {
+        let is_hierarchy = read.kind == Kind::Hierarchy;
+        if let (Some(share), false) = (thin, is_hierarchy || read.kind == Kind::Volume) {
             let thin = EditEntry::parse(&format!("thin:{}%", 100.0 * share));
             wanted.edits.push(thin.map_err(Error::Argument)?);
         }
@@ -108,9 +106,9 @@ impl Converter<'_> {
         (entry.transform, entry.edits) = Default::default();
         let (kind, is_divided) = (read.kind, self.divides(read));
         let file = File { converter: self, input: &wanted, kind, thin, is_divided };
+        let items = &self.loaded.scene.items[read.items.clone()];
         match data {
             Data::Volume(volume) if !volume.more_channels.is_empty() => {
-                let items = &self.loaded.scene.items[read.items.clone()];
                 let of_channel = |item: &Item| {
                     let Item::Volume(channel, _, transfer) = item else { return None };
                     let volume = Volume { more_channels: Vec::new(), ..(**channel).clone() };
@@ -125,7 +123,6 @@ impl Converter<'_> {
                 items.iter().filter_map(of_channel).collect()
             }
             data => {
-                let items = &self.loaded.scene.items[read.items.clone()];
                 let is_field = matches!(data.kind(), Kind::Volume | Kind::Cells);
                 let transfer = items.iter().find_map(Item::transfer).filter(|_| is_field).cloned();
                 Ok(vec![file.of(entry, transfer, "", data)?])

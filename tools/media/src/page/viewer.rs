@@ -1,6 +1,6 @@
 //! Where the viewer is: in this program, if it was there when it was built, or in a folder.
 
-use super::{content::unread, packing::unpacked_bytes};
+use super::content::unread;
 use crate::Failure;
 use lzma_rust2::LzipReader;
 use splatkit::Error;
@@ -85,7 +85,17 @@ impl Viewer {
             })
         };
         let (worker, element) = (read(WORKER)?, read(ELEMENT)?);
-        Ok(Self { worker, element, engine: read(ENGINE)?, unpacker: read(UNPACKER)? })
+        let viewer = Self { worker, element, engine: read(ENGINE)?, unpacker: read(UNPACKER)? };
+        // A damaged engine is an error here, and not of the page.
+        viewer.engine().map_err(|source| unread(&folder.join(ENGINE), &source))?;
+        Ok(viewer)
+    }
+
+    /// Unpacks the engine.
+    fn engine(&self) -> std::io::Result<Vec<u8>> {
+        let mut engine = Vec::new();
+        LzipReader::new(&self.engine[..]).read_to_end(&mut engine)?;
+        Ok(engine)
     }
 
     /// Returns the names and the bytes of the files that a folder needs.
@@ -93,10 +103,7 @@ impl Viewer {
     /// # Errors
     /// For a damaged engine.
     pub fn files(&self) -> Result<[(&'static str, Vec<u8>); 3], Failure> {
-        let mut engine = Vec::with_capacity(unpacked_bytes(&self.engine));
-        LzipReader::new(&self.engine[..])
-            .read_to_end(&mut engine)
-            .map_err(|source| unread(Path::new(ENGINE), &source))?;
+        let engine = self.engine().map_err(|source| unread(Path::new(ENGINE), &source))?;
         Ok([
             (WORKER, self.worker.clone()),
             (ELEMENT, self.element.clone()),
