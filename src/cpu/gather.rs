@@ -97,7 +97,7 @@ impl Level<'_> {
         // this one is called.
         simd.vectorize(
             #[inline(always)]
-            || {
+            move || {
                 let (value, slopes) = match &self.field {
                     Typed::U8(field) => field.at(simd, place),
                     Typed::U16(field) => field.at(simd, place),
@@ -106,6 +106,8 @@ impl Level<'_> {
                     Typed::F32(field) => field.at(simd, place),
                     Typed::Blend(blended) => return blended.at(simd, place, way),
                 };
+                // One by one: an array of vectors would be copied through memory, which waits.
+                let slopes = three!(I => slopes[I]);
                 Point { value, slopes, weight: Lanes::splat(simd, 1.0) }
             },
         )
@@ -141,21 +143,30 @@ pub const MOST_APART: f64 = 1.1;
 /// Number of sheets looked up at once.
 const LOOKED_UP: usize = 8;
 
-/// The last plane that a packet evaluated, and the visibility of the sheets ahead.
+/// What a packet keeps from one sheet to the next: the last plane that it evaluated, and the
+/// visibility of the sheets ahead.
 #[derive(Clone, Copy)]
 pub struct Last<S: Simd> {
     plane: usize,
-    face: Face<S>,
-    /// The gradient in view space, in entries per thickness of a sheet, at the plane where it was
-    /// evaluated.
-    gradient: [Lanes<S>; 3],
-    gradient_plane: usize,
-    along: Lanes<S>,
-    weight: Lanes<S>,
+    on: OnPlane<S>,
+    /// The gradient of a linear field, and the plane where it was evaluated.
+    far_gradient: [Lanes<S>; 3],
+    far_plane: usize,
     /// The first of the looked-up sheets, and for each sheet a bit for each ray on which something
     /// may be visible.
     first: usize,
     shows: [u8; LOOKED_UP],
+}
+
+/// The field on a plane.
+#[derive(Clone, Copy)]
+struct OnPlane<S: Simd> {
+    face: Face<S>,
+    /// The gradient in view space, in entries per thickness of a sheet.
+    gradient: [Lanes<S>; 3],
+    /// The change along the rays per world unit.
+    along: Lanes<S>,
+    weight: Lanes<S>,
 }
 
 impl<S: Simd> Last<S> {
@@ -165,11 +176,9 @@ impl<S: Simd> Last<S> {
         let face = Face { value: none, across: [none; 3] };
         Self {
             plane: usize::MAX,
-            face,
-            gradient: [none; 3],
-            gradient_plane: usize::MAX,
-            along: none,
-            weight: none,
+            on: OnPlane { face, gradient: [none; 3], along: none, weight: none },
+            far_gradient: [none; 3],
+            far_plane: usize::MAX,
             first: usize::MAX - LOOKED_UP,
             shows: [0; LOOKED_UP],
         }
@@ -232,32 +241,30 @@ impl Gather<'_> {
             let layer = self.label_layer(simd, rays, [start, stop], [begin, end]);
             return self.may_show(simd, &layer).then_some((layer, mask));
         }
-        if last.plane != sheet {
-            self.face(simd, rays, sheet, last);
-        }
-        let before = *last;
-        let (front, front_along, front_weight) = (before.face, before.along, before.weight);
-        self.face(simd, rays, sheet + 1, last);
-        let (back, thickness) = (last.face, stop - start);
-        let (sum, none) = (front.value + back.value, Lanes::splat(simd, 0.0));
+        let front = if last.plane == sheet { last.on } else { self.on_plane(simd, rays, sheet) };
+        let back = self.on_plane(simd, rays, sheet + 1);
+        (last.plane, last.on) = (sheet + 1, back);
+        let weights = [front.weight, back.weight];
+        let (thickness, none) = (stop - start, Lanes::splat(simd, 0.0));
+        let sum = front.face.value + back.face.value;
         // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the
         // slopes there.
-        let bend = (front_along - last.along) * thickness;
+        let bend = (front.along - back.along) * thickness;
         let middle = sum * 0.5 + bend * 0.125;
         let of_sheet = [Lanes::splat(simd, start), Lanes::splat(simd, thickness)];
-        let mut layer =
-            Layer::new(simd, rays.direction, [front, back], middle, of_sheet, [begin, end]);
+        let faces = [front.face, back.face];
+        let mut layer = Layer::new(simd, rays.direction, faces, middle, of_sheet, [begin, end]);
         if self.parts > 1 {
-            let mask = mask & self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer);
+            let mask = mask & self.fill_thick(simd, rays, weights, &mut layer);
             return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
         }
         let has_gaps =
-            self.is_blended && (mask & front_weight.min(last.weight).simd_le(0.0)).any_true();
+            self.is_blended && (mask & weights[0].min(weights[1]).simd_le(0.0)).any_true();
         layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
         if !has_gaps && !layer.weight.simd_gt(0.0).any_true() {
             return None;
         }
-        let is_bent = self.is_bent([&before, last], bend, &layer, mask);
+        let is_bent = self.is_bent([&front, &back], bend, &layer, mask);
         if self.has_far_gradient {
             self.refine_linear(simd, rays, (sheet, is_bent), last, &mut layer);
             return Some((layer, mask));
@@ -266,10 +273,10 @@ impl Gather<'_> {
             return Some((layer, mask));
         }
         let inside = self.at(simd, rays, 0.5 * (start + stop));
-        let sections = [before.gradient, self.gradient(inside.slopes), last.gradient];
+        let sections = [front.gradient, self.gradient(inside.slopes), back.gradient];
         if self.is_blended {
-            let mask = mask & layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
-            layer.set_sections(simd, plan, sections, [front_weight, inside.weight, last.weight]);
+            let mask = mask & layer.blend(simd, plan, bend, weights, &inside);
+            layer.set_sections(simd, plan, sections, [weights[0], inside.weight, weights[1]]);
             layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
             return layer.weight.simd_gt(0.0).any_true().then_some((layer, mask));
         }
@@ -313,13 +320,13 @@ impl Gather<'_> {
             layer.sections = Some([middle; 3]);
             return;
         }
-        let front = if last.gradient_plane == sheet {
-            last.gradient
+        let front = if last.far_plane == sheet {
+            last.far_gradient
         } else {
             self.far_gradient(simd, rays, start)
         };
         let back = self.far_gradient(simd, rays, stop);
-        (last.gradient, last.gradient_plane) = (back, sheet + 1);
+        (last.far_gradient, last.far_plane) = (back, sheet + 1);
         layer.sections = Some([front, middle, back]);
     }
 
@@ -378,7 +385,7 @@ impl Gather<'_> {
     #[inline(always)]
     fn is_bent<S: Simd>(
         &self,
-        [front, back]: [&Last<S>; 2],
+        [front, back]: [&OnPlane<S>; 2],
         bend: Lanes<S>,
         layer: &Layer<S>,
         mask: mask32x8<S>,
@@ -621,24 +628,22 @@ impl Gather<'_> {
         Point { value, slopes: three!(I => slopes[I] * inverse), weight: Lanes::splat(simd, 1.0) }
     }
 
-    /// Evaluates the field on a plane, and its change along the rays per world unit.
+    /// Evaluates the field on a plane.
     #[inline(always)]
-    fn face<S: Simd>(&self, simd: S, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
+    fn on_plane<S: Simd>(&self, simd: S, rays: &Rays<S>, plane: usize) -> OnPlane<S> {
         let field = &self.plan.field;
-        let per_value = field.values.per_value;
-        let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
-        let mut gradient = self.gradient(slopes);
+        let distance = self.plan.planes[plane];
+        let Point { value, slopes, weight } = self.at(simd, rays, distance);
+        let gradient = self.gradient(slopes);
         let along = dot(gradient, rays.direction);
-        (last.plane, last.weight) = (plane, weight);
-        if !self.has_far_gradient {
-            (last.gradient, last.gradient_plane) = (gradient, plane);
-        } else if self.parts > 1 && self.plan.has_gradients() {
-            gradient = self.far_gradient(simd, rays, self.plan.planes[plane]);
+        let mut across = (gradient, along);
+        if self.has_far_gradient && self.parts > 1 && self.plan.has_gradients() {
+            let far = self.far_gradient(simd, rays, distance);
+            across = (far, dot(far, rays.direction));
         }
-        let across = dot(gradient, rays.direction);
-        let across = three!(I => gradient[I] - across * rays.direction[I]);
-        last.along = along * (1.0 / field.gradients.length);
-        last.face = Face { value: value * per_value, across };
+        let across = three!(I => across.0[I] - across.1 * rays.direction[I]);
+        let face = Face { value: value * field.values.per_value, across };
+        OnPlane { face, gradient, along: along * (1.0 / field.gradients.length), weight }
     }
 
     /// Converts the field's change per step of the lattice to a gradient in view space, in entries
