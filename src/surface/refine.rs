@@ -679,9 +679,15 @@ fn cut(
     most: usize,
 ) -> std::result::Result<usize, Stop> {
     let base = mesh.positions.len() as u32;
+    let starts = starts_of(marked, mesh.positions.len())?;
+    let rank = |edge: (u32, u32)| {
+        let (low, high) = sorted(edge);
+        let [from, to] = [0, 1].map(|by| starts[low as usize + by] as usize);
+        marked[from..to].iter().position(|edge| edge.1 == high).map(|at| from + at)
+    };
     let halves = |t: [u32; 3]| {
         [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
-            .map(|edge| marked.binary_search(&sorted(edge)).ok().map(|rank| base + rank as u32))
+            .map(|edge| rank(edge).map(|rank| base + rank as u32))
     };
     let count = |&t: &[u32; 3]| 1 + halves(t).iter().flatten().count();
     let all = settled + mesh.triangles[settled..].par_iter().map(count).sum::<usize>();
@@ -717,6 +723,18 @@ fn cut(
         }
     }
     Ok(now_settled)
+}
+
+/// Returns, for each of `count` vertices, the first of the ascending edges that begins there or
+/// later, and at last their number. A vertex has few edges, so one is found at once.
+fn starts_of(edges: &[(u32, u32)], count: usize) -> Result<Vec<u32>> {
+    let mut starts = Vec::new();
+    memory::reserve(&mut starts, count + 1, WORK)?;
+    for (number, edge) in edges.iter().enumerate() {
+        starts.resize(starts.len().max(edge.0 as usize + 1), number as u32);
+    }
+    starts.resize(count + 1, edges.len() as u32);
+    Ok(starts)
 }
 
 /// Appends vertices between pairs of others, each at a fraction of the way.
@@ -784,6 +802,14 @@ fn split(t: [u32; 3], halves: [Option<u32>; 3], positions: &[Vec3]) -> ([[u32; 3
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn edges_begin_where_their_vertex_says() {
+        let edges = [(1, 4), (1, 7), (3, 4), (8, 9)];
+        let starts = starts_of(&edges, 10).unwrap();
+        assert_eq!(starts, [0, 0, 2, 2, 3, 3, 3, 3, 3, 4, 4]);
+        assert_eq!(starts_of(&[], 2).unwrap(), [0, 0, 0]);
+    }
 
     const NEVER: Deadline = Deadline::NEVER;
 
