@@ -97,7 +97,7 @@ impl Level<'_> {
         // this one is called.
         simd.vectorize(
             #[inline(always)]
-            move || {
+            || {
                 let (value, slopes) = match &self.field {
                     Typed::U8(field) => field.at(simd, place),
                     Typed::U16(field) => field.at(simd, place),
@@ -106,8 +106,6 @@ impl Level<'_> {
                     Typed::F32(field) => field.at(simd, place),
                     Typed::Blend(blended) => return blended.at(simd, place, way),
                 };
-                // One by one: an array of vectors would be copied through memory, which waits.
-                let slopes = three!(I => slopes[I]);
                 Point { value, slopes, weight: Lanes::splat(simd, 1.0) }
             },
         )
