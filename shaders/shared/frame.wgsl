@@ -25,6 +25,9 @@ struct Frame {
     entry_capacity: u32,
     // Ambient, diffuse, specular, power.
     surface_shade: vec4<f32>,
+    // The lamp of surfaces beside the eye: the direction to it, as long as the factor on the
+    // normal's cosine. Last, the factor on the cosine to the eye.
+    surface_sides: vec4<f32>,
     // Axis-aligned sheets: their normal in view space.
     sheet_normal: vec4<f32>,
     // The first record word of each field in the pass. The fields' records lie behind those of

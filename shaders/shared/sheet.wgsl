@@ -42,21 +42,41 @@ fn towards_eye(r: u32, gradient: vec3<f32>) -> vec3<f32> {
     return select(gradient, -gradient, dot(gradient, direction_of(r)) > 0.0);
 }
 
+// Returns the share of the light from the eye that a surface gets, and the cosine of its highlight.
+// They are the same.
+fn from_the_eye(normal: vec3<f32>, direction: vec3<f32>) -> vec2<f32> {
+    return vec2(min(abs(dot(normal, direction)) / max(length(normal), 1e-20), 1.0));
+}
+
+// The same with light from beside the eye.
+fn from_sides(normal: vec3<f32>, direction: vec3<f32>) -> vec2<f32> {
+    let facing = from_the_eye(normal, direction).x;
+    let lamp = frame.surface_sides.xyz;
+    let towards = dot(lamp, turned(normal, direction, CERTAIN));
+    // The highlight is that of a lamp between both.
+    let eye = 2.0 * frame.surface_sides.w + length(lamp);
+    let half = max(length(lamp - eye * direction), 1e-6);
+    return vec2(
+        min(frame.surface_sides.w * facing + max(towards, 0.0), 1.0),
+        clamp((eye * facing + towards) / half, 0.0, 1.0),
+    );
+}
+
 // Returns the factor on a colour, and the highlight that is added to it, by Blinn's model (1977) on
-// both sides of a surface.
+// both sides of a surface. `eye` has the share of the light from the eye, and the cosine of its
+// highlight. `certain` also has how far the normal counts in all.
 fn light_of(
     normal: vec3<f32>,
     direction: vec3<f32>,
+    eye: vec2<f32>,
     shade: vec4<f32>,
-    certain: vec2<f32>,
-    counts: f32,
+    certain: vec3<f32>,
     reaching: Reaching,
 ) -> vec2<f32> {
     let size = length(normal);
-    let share = counts * certainty_of(normal, certain);
-    let facing = min(abs(dot(normal, direction)) / max(size, 1e-20), 1.0);
-    let shown = 1.0 - share * (1.0 - facing);
-    let gloss = share * shade.z * pow(max(facing, 1e-6), shade.w);
+    let share = certain.z * certainty_of(normal, certain.xy);
+    let shown = 1.0 - share * (1.0 - eye.x);
+    let gloss = share * shade.z * pow(max(eye.y, 1e-6), shade.w);
     // A field without light has a negative power.
     if !LAMPS || shade.w < 0.0 {
         return vec2(shade.x + shade.y * shown, gloss);
@@ -83,7 +103,9 @@ fn light_of(
 fn lit(r: u32, color: vec3<f32>, normal: vec3<f32>, distance: f32) -> vec3<f32> {
     let direction = direction_of(r);
     let reaching = reaching_at(r, distance, turned(normal, direction, CERTAIN));
-    let light = light_of(normal, direction, frame.surface_shade, CERTAIN, 1.0, reaching);
+    let eye = from_sides(normal, direction);
+    let shade = frame.surface_shade;
+    let light = light_of(normal, direction, eye, shade, vec3(CERTAIN, 1.0), reaching);
     return min(color * light.x + light.y, vec3(1.0));
 }
 
@@ -96,9 +118,11 @@ fn lit_field(
     counts: f32,
     reaching: Reaching,
 ) -> vec3<f32> {
+    let direction = direction_of(r);
     let shade = frame.fields[f].shade;
-    let certain = frame.fields[f].certain.xy;
-    let light = light_of(gradient, direction_of(r), shade, certain, counts, reaching);
+    let certain = vec3(frame.fields[f].certain.xy, counts);
+    let eye = from_the_eye(gradient, direction);
+    let light = light_of(gradient, direction, eye, shade, certain, reaching);
     return min(color * light.x + light.y, vec3(1.0));
 }
 
@@ -123,9 +147,11 @@ fn lit_piece(
 // Returns the light of the field at a place in a sheet.
 fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
     let gradient = gradient_at(r, f, medium, place);
+    let direction = direction_of(r);
     let shade = frame.fields[f].shade;
-    let certain = frame.fields[f].certain.xy;
-    return light_of(gradient, direction_of(r), shade, certain, medium.share, medium.reaching);
+    let certain = vec3(frame.fields[f].certain.xy, medium.share);
+    let eye = from_the_eye(gradient, direction);
+    return light_of(gradient, direction, eye, shade, certain, medium.reaching);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients

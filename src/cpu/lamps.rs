@@ -8,7 +8,7 @@ use super::{
     vector::{self, Lanes, columns, dot, dot_with, each, three},
 };
 use crate::plan::{
-    frame::Light,
+    frame::{Light, Sides},
     lamps::{Affine, Lamps, Openness, ShadowMap},
 };
 use fearless_simd::{Simd, f32x4, prelude::*};
@@ -172,12 +172,30 @@ impl<S: Simd> Turned<S> {
         Self { normal: three!(I => normal[I] * towards), facing, certainty }
     }
 
-    /// Returns the factor on a colour, and the highlight that is added to it (Blinn 1977).
+    /// Returns the share of the light from the eye and from beside it that a surface gets, and the
+    /// cosine of its highlight.
+    #[inline(always)]
+    fn from_sides(&self, simd: S, sides: &Sides, direction: &[Lanes<S>; 3]) -> [Lanes<S>; 2] {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let (lamp, size) = (sides.lamp.to_array(), sides.lamp.length());
+        let towards = dot_with(lamp, self.normal);
+        let light = self.facing.mul_add(sides.eye, towards.max(none)).min(one);
+        // The highlight is that of a lamp between both.
+        let eye = Lanes::splat(simd, 2.0 * sides.eye + size);
+        let along = dot_with(lamp, *direction);
+        let size2 = (along * -2.0 + eye).mul_add(eye, Lanes::splat(simd, size * size));
+        let inverse = one / size2.max(Lanes::splat(simd, 1e-12)).sqrt();
+        let cosine = (self.facing.mul_add(eye, towards) * inverse).max(none).min(one);
+        [light, cosine]
+    }
+
+    /// Returns the factor on a colour, and the highlight that is added to it (Blinn 1977). `eye`
+    /// has the share of the light from the eye, and the cosine of its highlight.
     #[inline(always)]
     fn light(
         &self,
         simd: S,
-        Light { ambient, diffuse, specular, power }: Light,
+        (Light { ambient, diffuse, specular, power }, eye): (Light, [Lanes<S>; 2]),
         lamps: Option<&Lamps>,
         (direction, reaching): (&[Lanes<S>; 3], &Reaching<S>),
     ) -> [Lanes<S>; 2] {
@@ -185,16 +203,16 @@ impl<S: Simd> Turned<S> {
         let certain = self.certainty;
         let least = Lanes::splat(simd, 1e-6);
         let shown = |cosine: Lanes<S>| one - certain * (one - cosine);
-        let highlight = vector::power(simd, self.facing.max(least), power) * certain * specular;
+        let highlight = vector::power(simd, eye[1].max(least), power) * certain * specular;
         let Some(lamps) = lamps else {
-            return [shown(self.facing) * diffuse + ambient, highlight];
+            return [shown(eye[0]) * diffuse + ambient, highlight];
         };
         let [x, y, z, amount] = reaching.open;
         let open = amount + certain * dot([x, y, z], self.normal) * 2.0;
         // In the open there is no more.
         let most = certain.mul_add(dot_with(lamps.sky_side, self.normal) * 2.0, one);
         let open = open.min(most).max(none);
-        let mut factor = open * ((shown(self.facing) * lamps.head + lamps.sky) * diffuse + ambient);
+        let mut factor = open * ((shown(eye[0]) * lamps.head + lamps.sky) * diffuse + ambient);
         let mut highlight = highlight * open * lamps.head;
         if lamps.key > 0.0 {
             let towards = lamps.key_direction;
@@ -225,8 +243,9 @@ impl Plan<'_> {
         let turned = Turned::new(simd, normal, rays.direction, [0.0, 1e30], None);
         let reaching = Reaching::at(simd, self, rays, distance, &turned);
         let on = (&rays.direction, &reaching);
-        let [share, highlight] =
-            turned.light(simd, self.frame.surface_light, self.lamps.as_ref(), on);
+        let eye = turned.from_sides(simd, &self.frame.surface_sides, &rays.direction);
+        let light = (self.frame.surface_light, eye);
+        let [share, highlight] = turned.light(simd, light, self.lamps.as_ref(), on);
         with_light(simd, color, share, highlight)
     }
 
@@ -286,7 +305,8 @@ impl Plan<'_> {
         (direction, reaching): ([Lanes<S>; 3], &Reaching<S>),
     ) -> [Lanes<S>; 2] {
         let turned = Turned::new(simd, gradient, direction, self.certain(), share);
-        turned.light(simd, self.field.light, self.lamps.as_ref(), (&direction, reaching))
+        let light = (self.field.light, [turned.facing; 2]);
+        turned.light(simd, light, self.lamps.as_ref(), (&direction, reaching))
     }
 }
 

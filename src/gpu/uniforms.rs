@@ -36,6 +36,7 @@ pub struct Frame {
     pub record_capacity: u32,
     pub entry_capacity: u32,
     pub surface_shade: [f32; 4],
+    pub surface_sides: [f32; 4],
     pub sheet_normal: [f32; 4],
     /// Set on the GPU, before march.
     pub record_starts: [[u32; 4]; Scene::MAX_FIELDS / 4],
@@ -174,6 +175,7 @@ impl Frame {
             step_inverse: frame.per_step,
             z_near: frame.z_near,
             surface_shade: shade(frame.surface_light),
+            surface_sides: wide_with(frame.surface_sides.lamp.to_array(), frame.surface_sides.eye),
             sheet_normal: wide(frame.sheet_normal),
             world_x: wide(frame.to_world.x_axis),
             world_y: wide(frame.to_world.y_axis),

@@ -3,7 +3,7 @@
 
 use crate::{
     math::{Bounds, Sheets, View},
-    scene::{Clip, ClipShape, Mode, Scene, Settings},
+    scene::{Aside, Clip, ClipShape, Mode, Scene, Settings},
     volume::Shade,
 };
 use glam::{DVec3, Mat3, Vec3};
@@ -28,6 +28,7 @@ pub struct Frame {
     /// Smallest z in view space that any pixel sees (perspective).
     pub z_near: f32,
     pub surface_light: Light,
+    pub surface_sides: Sides,
     /// The normal of axis-aligned sheets in view space.
     pub sheet_normal: Vec3,
     /// The rotation from view space to the world's axes.
@@ -56,6 +57,32 @@ pub struct Light {
     pub power: f32,
 }
 
+/// How the eye's light is divided between the eye and a lamp beside it, in 32 bits.
+#[derive(Debug, Clone, Copy)]
+pub struct Sides {
+    /// The factor on the cosine of the normal to the eye.
+    pub eye: f32,
+    /// The direction to the lamp in view space. Its length is the factor on the normal's cosine.
+    pub lamp: Vec3,
+}
+
+impl Default for Sides {
+    /// All light comes from the eye.
+    fn default() -> Self {
+        Self { eye: 1.0, lamp: Vec3::ZERO }
+    }
+}
+
+impl Sides {
+    /// Returns the division at which the brightest part of a ball is as bright as if all light came
+    /// from the eye.
+    fn new(Aside { direction, share }: Aside) -> Self {
+        let (lamp, eye) = (share * direction.normalize(), 1.0 - share);
+        let brightest = (lamp - eye * DVec3::Z).length();
+        Self { eye: (eye / brightest) as f32, lamp: (lamp / brightest).as_vec3() }
+    }
+}
+
 impl Light {
     /// Returns a light of these shares. Without them, colours stay as they are: the power is
     /// negative, which tells the shaders that no light dims them.
@@ -82,6 +109,7 @@ impl Frame {
         let classified = classified.filter(|_| settings.classifies_samples());
         let shade =
             classified.map_or(settings.surface_shade, |transfer| settings.shade_of(transfer));
+        let aside = settings.lighting.aside.filter(|_| classified.is_none());
         let mut frame = Self {
             size: view.size,
             center: [view.center.x as f32, view.center.y as f32],
@@ -94,6 +122,7 @@ impl Frame {
             // Axis-aligned sheets may begin behind an eye that lies among them.
             z_near: (sheets.planes[0] * view.smallest_cosine()).max(1e-6 * sheets.step) as f32,
             surface_light: Light::new(shade),
+            surface_sides: aside.map(Sides::new).unwrap_or_default(),
             sheet_normal,
             to_world: view.rotation.transpose().as_mat3(),
             clips: Vec::new(),

@@ -64,7 +64,7 @@ impl<'a> LitBy<'a> {
     /// Returns a colour at a place with a gradient.
     fn one(&self, color: DVec3, gradient: (DVec3, f64), direction: DVec3) -> DVec3 {
         self.shade.map_or(color, |shade| {
-            shade::with_light(color, shade::light(gradient, direction, shade, &self.lamps))
+            shade::with_light(color, shade::light(gradient, (direction, None), shade, &self.lamps))
         })
     }
 }
@@ -159,7 +159,7 @@ impl Layer {
             let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
             let at = start + share * (end - start);
             let gradient = (self.gradient(at, direction), self.share());
-            let light = shade::light(gradient, direction, shade, &lit.lamps);
+            let light = shade::light(gradient, (direction, None), shade, &lit.lamps);
             (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
         }
         shade::with_light(color, sums)

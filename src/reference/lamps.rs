@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     math::View,
-    scene::{Lighting, MapView, OcclusionBox},
+    scene::{Aside, Lighting, MapView, OcclusionBox},
     volume::Shade,
 };
 use glam::{DVec3, DVec4};
@@ -85,11 +85,12 @@ impl Lamps {
         color: DVec3,
         normal: DVec3,
         (ray, distance): (&Ray, f64),
-        shade: &Shade,
+        (shade, aside): (&Shade, Option<&Aside>),
     ) -> DVec3 {
         let reaching = self.reaching((normal, 1.0), (ray, distance), shade);
         let lit = Some((self.lighting, reaching));
-        shade::with_light(color, shade::light((normal, 1.0), ray.direction, shade, &lit))
+        let from = (ray.direction, aside);
+        shade::with_light(color, shade::light((normal, 1.0), from, shade, &lit))
     }
 
     /// Returns the light at a distance along a ray, before a surface with a normal of any length.

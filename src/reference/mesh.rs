@@ -149,7 +149,8 @@ impl<'a> Traced<'a> {
             let color = DVec3::new(red.into(), green.into(), blue.into());
             let color = match &self.settings.surface_shade {
                 Some(shade) if !self.mesh.is_unlit(triangle) => {
-                    shade::lit(color, normal, direction, shade)
+                    let aside = self.settings.lighting.aside.as_ref();
+                    shade::lit(color, self.rotation * normal, ray.direction, shade, aside)
                 }
                 _ => color,
             };
@@ -209,8 +210,12 @@ fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Met> {
 mod tests {
     use super::*;
     use crate::{
-        compare::compare_pictures, math::Projection, reference::render, scene::Scene,
-        surface::SurfelOptions, volume::Shade,
+        compare::compare_pictures,
+        math::Projection,
+        reference::render,
+        scene::{Lighting, Scene},
+        surface::SurfelOptions,
+        volume::Shade,
     };
 
     fn camera(projection: Projection) -> Camera {
@@ -226,6 +231,7 @@ mod tests {
         let mut settings = Settings::new([48, 36]);
         let shade = Shade { ambient: 0.1, diffuse: 0.6, specular: 0.2, power: 8.0, certain: None };
         settings.surface_shade = Some(shade);
+        settings.lighting = Lighting::head();
         let picture = trace(&sphere, 60.0, &camera, &settings, 1).unwrap();
         for (at, pixel) in picture.color.iter().enumerate() {
             let place = (DVec2::new((at % 48) as f64, (at / 48) as f64) + 0.5

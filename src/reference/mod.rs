@@ -220,6 +220,13 @@
 //! The diffuse part is multiplied by 1 − c·(1 − cos), the highlight by c. So what is flat, or as
 //! noisy as a flat region, is drawn as if it faced the eye. Normals of radiance are certain.
 //!
+//! Radiance and facets have a part of that light from a lamp beside the eye (`aside` of
+//! [`Lighting`](crate::scene::Lighting)), with the share s and the direction l. b̂ is the direction
+//! from the eye, and a the optical axis. The cosine then is ((1 − s)·|n·b̂| + s·max(n·l, 0)) divided
+//! by |s·l − (1 − s)·a|, at most 1: on a ball on the axis, the brightest place has 1. The highlight
+//! is that of the half vector s·l − (2 − s)·b̂. Samples that are classified first are lit from the
+//! eye alone.
+//!
 //! Behind a clip, c is multiplied by s/(2·h), 1 at most. Here s is the length of the ray from the
 //! last clip before the sheet's end to its middle, and h the lattice's smallest spacing. So a cut
 //! face shows values, and not the relief of their noise.
@@ -322,7 +329,7 @@ use crate::{
     math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
-    scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
+    scene::{Aside, Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
     splat::TrainedSplats,
     volume::{Lattice, Shade},
 };
@@ -457,6 +464,8 @@ struct Frame<'a> {
     lattice: Option<&'a Lattice>,
     /// The shading of radiance.
     shade: Option<Shade>,
+    /// The light of radiance from beside the eye.
+    aside: Option<Aside>,
     /// Lights, unless all light comes from the eye.
     lamps: Option<Lamps>,
     /// Whether the scene has trained Gaussians.
@@ -508,6 +517,7 @@ impl<'a> Frame<'a> {
             // Normals are as certain as their splats.
             shade: if before && has_field { shade } else { settings.surface_shade }
                 .map(|shade| Shade { certain: None, ..shade }),
+            aside: settings.lighting.aside.filter(|_| !(before && has_field)),
             view,
         }
     }
@@ -566,8 +576,8 @@ impl<'a> Frame<'a> {
     /// Returns the lit colour of a surface at a distance along a ray.
     fn lit_surface(&self, color: DVec3, normal: DVec3, at: (&Ray, f64), shade: &Shade) -> DVec3 {
         match &self.lamps {
-            Some(lamps) => lamps.lit(color, normal, at, shade),
-            None => shade::lit(color, normal, at.0.direction, shade),
+            Some(lamps) => lamps.lit(color, normal, at, (shade, self.aside.as_ref())),
+            None => shade::lit(color, normal, at.0.direction, shade, self.aside.as_ref()),
         }
     }
 

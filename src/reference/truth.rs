@@ -260,7 +260,8 @@ impl<'a> Pointwise<'a> {
     }
 
     fn lit(&self, color: DVec3, gradient: DVec3, ray: &Ray) -> DVec3 {
-        self.shade.as_ref().map_or(color, |shade| shade::lit(color, gradient, ray.direction, shade))
+        let lit = |shade| shade::lit(color, gradient, ray.direction, shade, None);
+        self.shade.as_ref().map_or(color, lit)
     }
 
     /// Returns the value and the view-space gradient at a point, or `None` where next to no kernel

@@ -1,4 +1,4 @@
-//! Where light comes from: the eye, a key light, the sky; and what keeps it away.
+//! Where light comes from: the eye and beside it, a key light, the sky; and what keeps it away.
 
 use super::{Gradient, Mode, Optics, Scene, Settings};
 use crate::{
@@ -19,6 +19,9 @@ use serde::{Deserialize, Serialize};
 pub struct Lighting {
     /// The share of the light from the eye.
     pub head: f64,
+    /// How surfaces get a part of that light from beside the eye. `None` lights them as fields are
+    /// lit, from the eye alone.
+    pub aside: Option<Aside>,
     /// A lamp far away.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub key: Option<KeyLight>,
@@ -29,6 +32,23 @@ pub struct Lighting {
     /// ambient part of the light, that of the sky and that of the eye.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub occlusion: Option<Occlusion>,
+}
+
+/// A lamp beside the eye, which moves with the camera and casts no shadows. It is not behind the
+/// scene.
+///
+/// With light from the eye alone, faces that are turned by equal angles from the eye look alike,
+/// and the edge between them is lost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Aside {
+    /// The direction towards the lamp in view space: right, down, forward.
+    #[cfg_attr(test, schemars(with = "[f64; 3]"))]
+    pub direction: DVec3,
+    /// The part of the eye's light that comes from there: from 0 to 1. The brightest part of a ball
+    /// stays as bright as without the lamp.
+    pub share: f64,
 }
 
 /// A lamp far away, which moves with the camera.
@@ -74,7 +94,14 @@ pub struct Occlusion {
 
 impl Default for Lighting {
     fn default() -> Self {
-        Self { head: 1.0, key: None, sky: None, occlusion: None }
+        Self { head: 1.0, aside: Some(Aside::default()), key: None, sky: None, occlusion: None }
+    }
+}
+
+impl Default for Aside {
+    fn default() -> Self {
+        // 30 degrees to the left, and 30 degrees up.
+        Self { direction: DVec3::new(-0.433, -0.5, -0.75), share: 0.5 }
     }
 }
 
@@ -98,9 +125,14 @@ impl Lighting {
     /// blurs a surface by two steps along the light, and by one and a half across it.
     pub(crate) const AHEAD: f64 = 2.5;
 
+    /// All light from the eye.
+    pub fn head() -> Self {
+        Self { aside: None, ..Self::default() }
+    }
+
     /// A lamp at the upper left before the scene, and some light from the eye in its shadows.
     pub fn key() -> Self {
-        Self { head: 0.3, key: Some(KeyLight::upper_left(0.8)), ..Self::default() }
+        Self { head: 0.3, key: Some(KeyLight::upper_left(0.8)), ..Self::head() }
     }
 
     /// As photographers light: a key light, some light from all sides, and some from the eye.
@@ -109,13 +141,14 @@ impl Lighting {
         // surfaces keep their shapes.
         let sky = Some(Sky { up, share: 0.3 });
         let occlusion = Some(Occlusion::default());
-        Self { head: 0.1, key: Some(KeyLight::upper_left(0.5)), sky, occlusion }
+        Self { head: 0.1, key: Some(KeyLight::upper_left(0.5)), sky, occlusion, ..Self::head() }
     }
 
     /// Light from all sides, brighter from above.
     pub fn sky(up: DVec3) -> Self {
         let occlusion = Occlusion { radius: 1.0, ..Occlusion::default() };
-        Self { head: 0.1, key: None, sky: Some(Sky { up, share: 0.9 }), occlusion: Some(occlusion) }
+        let sky = Some(Sky { up, share: 0.9 });
+        Self { head: 0.1, sky, occlusion: Some(occlusion), ..Self::head() }
     }
 
     /// Returns the same light, whose lamp casts shadows or not.
@@ -127,15 +160,20 @@ impl Lighting {
         self
     }
 
-    /// Whether all light comes from the eye, and nothing keeps it away.
+    /// Whether all light comes from the eye and from beside it, and nothing keeps it away.
     pub fn is_plain(&self) -> bool {
-        *self == Self::default()
+        Self { aside: None, ..*self } == Self::head()
     }
 
     /// Checks that settings can draw this light. The error is a message.
     pub(crate) fn check(&self, settings: &Settings) -> Result<(), String> {
-        if self.is_plain() {
-            return Ok(());
+        if let Some(Aside { share, direction }) = self.aside {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(format!("the share of the light `aside` is {share}, not 0 to 1"));
+            }
+            if !(direction.z <= 0.0) {
+                return Err("the lamp of the light `aside` is behind the scene".into());
+            }
         }
         let shares = [
             ("head", self.head),
@@ -147,8 +185,11 @@ impl Lighting {
                 return Err(format!("the share of the light `{name}` is {share}, not 0 to 10"));
             }
         }
-        let directions =
-            [("key", self.key.map(|key| key.direction)), ("sky", self.sky.map(|sky| sky.up))];
+        let directions = [
+            ("aside", self.aside.map(|aside| aside.direction)),
+            ("key", self.key.map(|key| key.direction)),
+            ("sky", self.sky.map(|sky| sky.up)),
+        ];
         for (name, direction) in directions {
             if direction.is_some_and(|direction| direction.try_normalize().is_none()) {
                 return Err(format!("the direction of the light `{name}` has no length"));
@@ -176,7 +217,9 @@ impl Lighting {
     }
 
     fn check_methods(&self, settings: &Settings) -> Result<(), String> {
-        let what = if settings.mode != Mode::Sheets {
+        let what = if self.is_plain() {
+            return Ok(());
+        } else if settings.mode != Mode::Sheets {
             "sheets that are parallel to the picture"
         } else if settings.classifies_samples() {
             "values that are classified after interpolation"

@@ -13,7 +13,7 @@ mod validate;
 
 pub use crate::math::{Clip, ClipShape};
 pub use item::Item;
-pub use lighting::{KeyLight, Lighting, Occlusion, Sky};
+pub use lighting::{Aside, KeyLight, Lighting, Occlusion, Sky};
 pub(crate) use lighting::{MapView, OcclusionBox};
 pub use settings::{
     Classification, Controls, Evaluate, Gradient, Mode, Optics, Order, Region, Settings,

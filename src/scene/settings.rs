@@ -199,7 +199,8 @@ impl Settings {
             evaluate: Evaluate::default(),
             volume_shade: None,
             surface_shade: Some(Shade {
-                ambient: 0.2,
+                // In full light, a surface has its own colour.
+                ambient: 0.25,
                 diffuse: 0.75,
                 specular: 0.15,
                 power: 24.0,

@@ -96,7 +96,7 @@ impl Drawing {
             let settings = Settings {
                 volume_shade: Some(Some(shade)),
                 surface_shade: Some(shade),
-                lighting: Lighting { head: 0.0, key, sky: None, occlusion: None },
+                lighting: Lighting { head: 0.0, key, ..Lighting::head() },
                 ..self.settings.clone()
             };
             draw(None, &settings)?.reduced(self.factor)

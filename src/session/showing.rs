@@ -183,8 +183,8 @@ impl Showing {
         options.line_width = self.line_width;
         options.radius_scale *= self.radius_scale.unwrap_or(1.0);
         options.color_by_normal = self.coloring().by_normal();
-        // Triangles of one plane still join.
-        let crease = self.crease.map(|crease| crease.max(0.01));
+        // Triangles of one plane still join. Larger angles than 60 leave the choice to the mesh.
+        let crease = self.crease.map(|crease| crease.clamp(0.01, 60.0));
         options.crease_angle_degrees = crease.unwrap_or(options.crease_angle_degrees);
         let opacity = self.opacity.filter(|opacity| *opacity < 1.0);
         if let Some(opacity) = opacity {

@@ -12,6 +12,10 @@ use glam::Vec3;
 /// in the plane of their group.
 const SHARPEST: f32 = 60.0;
 
+/// Creases of parts (degrees), unless the options say otherwise: meshes as construction programs
+/// make them. The sides of a prism of nine sides are flat, and ten sides are meant as a round.
+const OF_PARTS: f32 = 38.0;
+
 /// The name of this module's work in errors.
 const WORK: &str = "finding the normals of the triangles' corners";
 
@@ -76,6 +80,9 @@ impl Groups {
 /// corner's smooth group, weighted by angle. Triangles without area only have the file's normals,
 /// or zero.
 ///
+/// A crease angle above 60 degrees is the usual one: 60, but 38 in a whole mesh that is no
+/// sculpture and has no normals.
+///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
 pub(crate) fn corner_normals(
@@ -87,7 +94,8 @@ pub(crate) fn corner_normals(
     memory::room(WORK, 48 * mesh.positions.len() as u64 + 120 * mesh.triangles.len() as u64)?;
     let clock = Clock::new(deadline);
     let cosine = Groups::new(crease_angle_degrees).crease();
-    let creases = if mesh.normals.is_empty() && grouping == Grouping::Whole {
+    let is_free = mesh.normals.is_empty() && grouping == Grouping::Whole;
+    let creases = if is_free {
         let unit = |triangle: usize| at_corner(mesh, 3 * triangle as u32);
         let unit = |triangle: usize| unit(triangle).map_or(Vec3::ZERO, |(normal, _)| normal);
         let unit: Vec<Vec3> = (0..mesh.triangles.len()).into_par_iter().map(unit).collect();
@@ -96,10 +104,12 @@ pub(crate) fn corner_normals(
     } else {
         None
     };
+    let is_part = is_free && creases.is_none() && crease_angle_degrees > SHARPEST;
+    let crease = if is_part { OF_PARTS } else { crease_angle_degrees };
     let by_vertex: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
         .map_init(
-            || (Groups::new(crease_angle_degrees), Fan::new()),
+            || (Groups::new(crease), Fan::new()),
             |(cones, fan), vertex| {
                 if clock.is_over(vertex) {
                     return Vec::new();
@@ -181,6 +191,7 @@ fn at_corner(mesh: &Mesh, at: u32) -> Option<(Vec3, f32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::SurfelOptions;
 
     #[test]
     fn groups_are_cones_around_their_first() {
@@ -217,6 +228,43 @@ mod tests {
                 assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);
             }
         }
+    }
+
+    /// A closed prism around z, of faces that share their vertices.
+    fn prism(sides: u32) -> Mesh {
+        let mut mesh = Mesh::default();
+        for z in [0.0, 1.0] {
+            mesh.positions.extend((0..sides).map(|side| {
+                let angle = std::f32::consts::TAU * side as f32 / sides as f32;
+                Vec3::new(angle.cos(), angle.sin(), z)
+            }));
+        }
+        for a in 0..sides {
+            let b = (a + 1) % sides;
+            mesh.triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
+        }
+        for a in 1..sides - 1 {
+            mesh.triangles.extend([[0, a + 1, a], [sides, sides + a, sides + a + 1]]);
+        }
+        mesh
+    }
+
+    #[test]
+    fn the_sides_of_prisms_are_flat_and_those_of_cylinders_are_not() {
+        let flat = |mesh: &Mesh, crease: f32| {
+            let normals = corner_normals(mesh, (crease, Grouping::Whole), Deadline::NEVER).unwrap();
+            mesh.triangles.iter().zip(&normals).all(|(triangle, normals)| {
+                let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
+                let flat = (b - a).cross(c - a).normalize();
+                normals.iter().all(|normal| normal.dot(flat) > 0.9999)
+            })
+        };
+        let usual = SurfelOptions::default().crease_angle_degrees;
+        for (sides, is_flat) in [(3, true), (6, true), (8, true), (10, false), (24, false)] {
+            assert_eq!(flat(&prism(sides), usual), is_flat, "{sides} sides");
+        }
+        // An angle that is asked for counts.
+        assert!(!flat(&prism(8), 60.0) && flat(&prism(24), 10.0));
     }
 
     /// A closed tube whose end is rounded within two rings of triangles of uneven steps: some of

@@ -70,8 +70,9 @@ pub struct SurfelOptions {
     /// depths add up to it. From 7 on, which is opaque, it is the optical depth at the centre of
     /// each surfel; inside a triangle the total is then never below 0.28 times this.
     pub optical_depth: f32,
-    /// Neighbouring triangles whose normals differ by more than this angle meet in a crease; at
-    /// most 60.
+    /// Neighbouring triangles whose normals differ by more than this angle meet in a crease. An
+    /// angle above 60, such as the default, is the usual one: 60, but 38 for the facets of a mesh
+    /// as construction programs make it.
     pub crease_angle_degrees: f32,
     /// Triangles are cut until no edge is longer than this fraction of the bounding box's diagonal.
     pub largest_spacing: f32,

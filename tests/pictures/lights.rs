@@ -13,7 +13,9 @@ use splatkit::{
     math::{Camera, Projection},
     picture::Picture,
     reference,
-    scene::{Evaluate, KeyLight, Lighting, Mode, Occlusion, Optics, Order, Scene, Settings, Sky},
+    scene::{
+        Aside, Evaluate, KeyLight, Lighting, Mode, Occlusion, Optics, Order, Scene, Settings, Sky,
+    },
     surface::Mesh,
     volume::{Shade, TransferFunction},
 };
@@ -30,6 +32,7 @@ fn all_lights() -> Lighting {
     let occlusion = Occlusion { strength: 0.9, radius: 0.3, axes: 2, resolution: 20 };
     Lighting {
         head: 0.25,
+        aside: Some(Aside::default()),
         key: Some(key),
         sky: Some(Sky { up: DVec3::new(0.2, 1.0, 0.1), share: 0.4 }),
         occlusion: Some(occlusion),
@@ -97,7 +100,7 @@ fn mixed() {
 #[test]
 fn one_light_at_a_time() {
     let Lighting { key, sky, occlusion, .. } = all_lights();
-    let none = Lighting::default();
+    let none = Lighting::head();
     for lighting in [
         Lighting { occlusion, ..none },
         Lighting { key, head: 0.2, ..none },
@@ -145,13 +148,89 @@ fn at(picture: &Picture, [x, y]: [f64; 2]) -> f64 {
     f64::from(picture.color[pixel[1] * 64 + pixel[0]][0])
 }
 
+/// A white prism around the y axis, as high as it is wide: its mesh, and the normal and the middle of
+/// each of its sides and of its top.
+fn prism(sides: u32, turn: f64) -> (Mesh, Vec<[DVec3; 2]>) {
+    let at = |side: f64, y: f64| {
+        let angle = std::f64::consts::TAU * side / f64::from(sides) + turn.to_radians();
+        DVec3::new(angle.sin(), y, angle.cos())
+    };
+    let ring = |y: f64| (0..sides).map(move |side| at(f64::from(side), y).as_vec3());
+    let mut mesh = Mesh { positions: ring(-1.0).chain(ring(1.0)).collect(), ..Mesh::default() };
+    for a in 0..sides {
+        let b = (a + 1) % sides;
+        mesh.triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
+    }
+    for a in 1..sides - 1 {
+        mesh.triangles.extend([[0, a + 1, a], [sides, sides + a, sides + a + 1]]);
+    }
+    mesh.colors = vec![[255; 4]; mesh.positions.len()];
+    let inner = (0.5 * std::f64::consts::TAU / f64::from(sides)).cos();
+    let middles = (0..sides).map(|side| at(f64::from(side) + 0.5, 0.0));
+    let faces = middles.map(|normal| [normal, inner * normal]);
+    (mesh, faces.chain([[DVec3::Y; 2]]).collect())
+}
+
+/// Returns the brightness of the faces of a prism in its usual picture, the top last; `None` for
+/// those that are hidden, or nearly.
+fn faces_of_prism(
+    device: &Device,
+    (sides, turn): (u32, f64),
+    lighting: Lighting,
+) -> Vec<Option<f64>> {
+    let (mesh, faces) = prism(sides, turn);
+    let scene = scene(&[mesh]);
+    let settings = Settings { lighting, ..Settings::new([160, 120]) };
+    let camera = Camera::fit(&scene, settings.size).expect("a camera");
+    let view = camera.view(settings.size).expect("a view");
+    let case = Case { name: "a prism", scene, camera, settings };
+    let picture = by(device, &case);
+    let brightness = |[normal, middle]: &[DVec3; 2]| {
+        let place = view.rotation * (middle - view.position);
+        let facing = -(view.rotation * *normal).dot(place.normalize());
+        let pixel = (view.center + view.scale * place.truncate() / place.z).as_uvec2();
+        let color = picture.color[(pixel.y * 160 + pixel.x) as usize];
+        (facing > 0.1).then(|| f64::from(color[0]))
+    };
+    faces.iter().map(brightness).collect()
+}
+
+/// Returns the least difference between faces of a prism that meet, as a part of the brightest, and
+/// how bright the darkest is.
+fn contrast(faces: &[Option<f64>]) -> [f64; 2] {
+    let sides = faces.len() - 1;
+    let seen = || faces.iter().flatten().copied();
+    let brightest = seen().fold(0.0, f64::max);
+    let pairs = (0..sides).flat_map(|side| [[side, (side + 1) % sides], [side, sides]]);
+    let difference = |[a, b]: [usize; 2]| Some((faces[a]? - faces[b]?).abs());
+    let least = pairs.filter_map(difference).fold(f64::INFINITY, f64::min);
+    [least, seen().fold(f64::INFINITY, f64::min)].map(|light| light / brightest)
+}
+
+#[test]
+fn every_face_of_a_part_is_seen_in_its_usual_picture() {
+    // The eye is at 30 degrees. The edge of a prism at 30 degrees is in front, between two sides
+    // that are equally turned away from the eye.
+    let turns = [(4, 45.0), (4, 30.0), (3, 0.0), (3, 30.0), (6, 0.0), (6, 30.0)];
+    for device in [Device::Cpu, Device::Gpu(gpu().clone(), Budget::default())] {
+        for prism in turns {
+            let faces = faces_of_prism(&device, prism, Lighting::default());
+            let [difference, darkest] = contrast(&faces);
+            println!("{prism:?}: {difference:.2} {darkest:.2} {faces:.2?}");
+            assert!(difference > 0.04 && darkest > 0.35, "{prism:?}: {faces:?}");
+        }
+    }
+    let [difference, _] = contrast(&faces_of_prism(&Device::Cpu, (6, 30.0), Lighting::head()));
+    assert!(difference < 0.02, "the eye's light shows an edge in front: {difference}");
+}
+
 #[test]
 fn a_shadow_lies_where_the_light_leads() {
     // A lamp at 45° from the left: the small square, half a unit up, casts its shadow half a unit
     // to the right.
     let scene = scene(&[square(2.0, 0.0), square(0.4, 0.5)]);
     let key = KeyLight { direction: DVec3::new(-1.0, 0.0, -1.0), share: 1.0, shadows: 256 };
-    let lighting = Lighting { head: 0.0, key: Some(key), ..Lighting::default() };
+    let lighting = Lighting { head: 0.0, key: Some(key), ..Lighting::head() };
     let picture = from_above(&scene, lighting);
     let cosine = 0.5_f64.sqrt();
     for (place, expected) in [
@@ -171,7 +250,7 @@ fn a_shadow_lies_where_the_light_leads() {
 #[test]
 fn a_plane_in_the_open_is_bright_and_a_corner_is_dimmed() {
     let occlusion = Occlusion { strength: 1.0, radius: 2.0, axes: 64, resolution: 64 };
-    let lighting = Lighting { occlusion: Some(occlusion), ..Lighting::default() };
+    let lighting = Lighting { occlusion: Some(occlusion), ..Lighting::head() };
     let plane = from_above(&scene(&[square(2.0, 0.0)]), lighting);
     let brightness = at(&plane, [0.3, 0.1]);
     assert!((brightness - 1.0).abs() < 0.04, "{brightness}");
@@ -207,7 +286,7 @@ fn fog_dims_what_lies_behind_it() {
     let scene = plane.with_volume(volume, Default::default(), transfer);
     // From the lower left, so that the shadow lies beside the fog in the picture.
     let key = KeyLight { direction: DVec3::new(-1.0, 0.0, -0.5), share: 1.0, shadows: 256 };
-    let lighting = Lighting { head: 0.0, key: Some(key), ..Lighting::default() };
+    let lighting = Lighting { head: 0.0, key: Some(key), ..Lighting::head() };
     let picture = from_above(&scene, lighting);
     let cosine = 0.5 / 1.25_f64.sqrt();
     // The way through the slab is longer by one over the cosine.
@@ -256,6 +335,8 @@ fn lights_that_cannot_be_drawn_are_refused() {
         ((|s| s.mode = Mode::Splats(Order::default())) as fn(&mut Settings), "sheets"),
         (|s| s.optics = Optics::XRay, "emission and absorption"),
         (|s| s.lighting.head = f64::NAN, "head"),
+        (|s| s.lighting.aside.as_mut().expect("a lamp").share = 1.5, "not 0 to 1"),
+        (|s| s.lighting.aside.as_mut().expect("a lamp").direction = DVec3::Z, "behind"),
         (|s| s.lighting.sky = Some(Sky { up: DVec3::ZERO, share: 0.5 }), "no length"),
         (
             |s| s.lighting.occlusion = Some(Occlusion { radius: 0.0, ..Default::default() }),

@@ -60,8 +60,9 @@ pub struct EngineFlags {
     /// Draw volumes and surfaces in their own colours, without light.
     #[arg(long, visible_alias = "flat", overrides_with = "shade")]
     no_shade: bool,
-    /// Choose where light comes from: the eye; a lamp at the upper left that casts shadows; that
-    /// lamp and all sides; or all sides, more from above [default: head]
+    /// Choose where light comes from: the eye, and for surfaces also beside it; the eye alone; a
+    /// lamp at the upper left that casts shadows; that lamp and all sides; or all sides, more from
+    /// above [default: soft]
     #[arg(long, value_enum)]
     light: Option<Light>,
     /// Choose whether the lamp of the light key or studio casts shadows [default: true]
@@ -156,6 +157,7 @@ enum Engine {
 /// [`LightName`] as a flag.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Light {
+    Soft,
     Head,
     Key,
     Studio,
@@ -165,6 +167,7 @@ enum Light {
 impl From<Light> for LightName {
     fn from(light: Light) -> Self {
         match light {
+            Light::Soft => Self::Soft,
             Light::Head => Self::Head,
             Light::Key => Self::Key,
             Light::Studio => Self::Studio,

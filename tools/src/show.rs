@@ -96,7 +96,7 @@ pub struct ShowFlags {
     glyph_scale: Option<f64>,
     /// Meshes: split the normals where two triangles meet at more than this angle, so that the
     /// crease looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees
-    /// [default: 60]
+    /// [default: 60, or 38 for parts as construction programs make them]
     #[arg(long, value_name = "DEGREES", value_parser = parse::crease)]
     crease: Option<f32>,
     /// Draw the edges of the triangles of meshes, or of cells, as thin dark lines.

@@ -1,7 +1,7 @@
 //! Splats of radiance, alone and inside fields, and scenes that cannot be drawn.
 
 use super::*;
-use crate::{Error, splat::encode_normal};
+use crate::{Error, scene::Lighting, splat::encode_normal};
 
 #[test]
 fn one_round_splat_is_its_projection() {
@@ -48,7 +48,8 @@ fn opacity_scales_the_strength_and_normals_catch_the_light() {
     let scene = Scene::new().with_splats(surfels(vec![splat]));
     let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.2, power: 4.0, certain: None };
     // An odd number of pixels: one lies in the middle.
-    let settings = Settings { surface_shade: Some(shade), ..Settings::new([1, 1]) };
+    let lighting = Lighting::head();
+    let settings = Settings { surface_shade: Some(shade), lighting, ..Settings::new([1, 1]) };
     let [red, .., opacity] = render(&scene, &camera, &settings).unwrap().color[0];
     // Widened by a pixel of this size, the translucent splat has lost depth as its area has grown.
     let view = camera.view([1, 1]).unwrap();

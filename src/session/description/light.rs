@@ -14,8 +14,11 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum LightName {
-    /// From the eye.
+    /// Surfaces get it from the eye and from beside it, volumes from the eye
+    /// ([`Lighting::default`]).
     #[default]
+    Soft,
+    /// From the eye.
     Head,
     /// From a lamp at the upper left before the scene, which casts shadows ([`Lighting::key`]).
     Key,
@@ -61,7 +64,8 @@ impl PictureEntry {
     /// Returns the light of a picture whose scene stands with this direction up.
     pub(super) fn lighting(&self, up: DVec3) -> Lighting {
         let lighting = match self.light.unwrap_or_default() {
-            LightName::Head => Lighting::default(),
+            LightName::Soft => Lighting::default(),
+            LightName::Head => Lighting::head(),
             LightName::Key => Lighting::key(),
             LightName::Studio => Lighting::studio(up),
             LightName::Sky => Lighting::sky(up),

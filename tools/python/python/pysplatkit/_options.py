@@ -233,7 +233,7 @@ class Method(TypedDict, total=False):
     optics: str
     #: False draws without light, True lights volumes in any case.
     shade: bool
-    #: head, key, studio or sky.
+    #: soft, head, key, studio or sky.
     light: str
     #: Whether the lamp of the light key or studio casts shadows.
     shadows: bool

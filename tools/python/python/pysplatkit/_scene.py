@@ -596,8 +596,9 @@ class Scene:
             classify: pre-integrated, post or pre. Default: pre-integrated.
             optics: light, maximum or x-ray. Default: light.
             shade: False draws without light, True lights volumes in any case.
-            light: head (from the eye), key (a lamp that casts shadows), studio (that lamp and all
-                sides) or sky (all sides, more from above). Default: head.
+            light: soft (from the eye, for surfaces also from beside it), head (from the eye), key
+                (a lamp that casts shadows), studio (that lamp and all sides) or sky (all sides,
+                more from above). Default: soft.
             shadows: Whether the lamp casts shadows. Default: True.
             ambient_occlusion: How far light is dimmed where things around a place keep it away,
                 from 0 to 1. Default: 1 for studio and sky, else 0.
