@@ -1,6 +1,9 @@
 //! Points that span what a picture shows of a scene, for cameras that are fitted to it.
 
-use super::{Clip, Item, Scene, specks::take_specks};
+use super::{
+    Clip, Item, Scene,
+    specks::{means_around, take_specks},
+};
 use crate::{
     Result,
     bricks::{Bricks, Level},
@@ -33,8 +36,15 @@ const MOST_SAMPLES: usize = 1 << 24;
 /// The share of the visible samples that may be lost on each side of a volume, as noise.
 const NOISE: f64 = 0.001;
 
-/// The optical depth of a tenth of a volume's diagonal from which on a block of samples is seen.
-const FAINT: f64 = 0.02;
+/// A block of samples is seen if it absorbs this share of the light that passes through it.
+const FAINT: f64 = 0.1;
+
+/// So are fainter ones in haze: if a tenth of the volume's diagonal, as dense as the blocks around
+/// one are in the mean, has this optical depth. Dust and veils have less.
+const FAINT_HAZE: f64 = 0.15;
+
+/// The blocks around a block: one in so many of the longest side, to each side of it.
+const AROUND: usize = 24;
 
 /// The optical depth of a block of samples that is opaque.
 const OPAQUE: f64 = 3.0;
@@ -50,7 +60,8 @@ impl Scene {
     /// diagonals, and a twentieth beyond 20 diagonals. Of trained scenes the background too, a
     /// fifth beyond 1.5 diagonals if it lies all around.
     ///
-    /// So are specks of a volume apart from the rest, up to a thousandth of what is seen. The time
+    /// So are specks of a volume apart from the rest, up to a thousandth of what is seen, and dust
+    /// and veils that take less than about a tenth of the light, unless all is that faint. The time
     /// is linear in the number of splats and samples; of large hierarchies and bricks only coarse
     /// levels are read. If an item shows nothing, or the clips remove it, the corners of its box
     /// stand for it.
@@ -342,6 +353,17 @@ fn of_volume(volume: &Volume, transfer: &TransferFunction, clips: &[Clip]) -> Ve
     outermost(&places).into_iter().flat_map(reach).collect()
 }
 
+/// Returns which blocks of a volume are seen, from their mean extinctions: those from the first
+/// limit on, and others where the mean of the blocks around them is above the second.
+fn seen_blocks(means: &[f32], dims: [usize; 3], limits: [f64; 2]) -> Vec<bool> {
+    // What is fainter is seen only if nothing is more opaque.
+    let most = means.iter().copied().fold(0.0, f32::max);
+    let [least, haze] = limits.map(|limit| (limit as f32).min(0.05 * most));
+    let around = means_around(means, dims, dims[0].max(dims[1]).max(dims[2]) / AROUND);
+    let is_seen = |(&mean, &around): (&f32, &f32)| mean > 0.0 && (mean >= least || around >= haze);
+    means.iter().zip(&around).map(is_seen).collect()
+}
+
 impl<'a> Rows<'a> {
     fn new(volume: &'a Volume, transfer: &TransferFunction, clips: &'a [Clip]) -> Self {
         let [low, high] = volume.range;
@@ -373,17 +395,15 @@ impl<'a> Rows<'a> {
             rows.of_labels =
                 (0..count).map(|at| transfer.extinction(low + at as f64) as f32).collect();
         }
+        let (means, dims) = (rows.block_means(), rows.block_dims());
         let diagonal = volume.bounds().diagonal();
-        let least = (FAINT / (0.1 * diagonal)) as f32;
-        let means = rows.block_means();
-        // What is fainter is seen only if nothing is more opaque.
-        let most = means.iter().copied().fold(0.0, f32::max);
-        let least = if rows.noise > 0.0 { least.min(0.05 * most) } else { 0.0 };
-        rows.blocks = means.iter().map(|mean| *mean > 0.0 && *mean >= least).collect();
-        // More than what makes a block opaque does not count.
         let side = diagonal * BLOCK as f64 / nx.max(ny).max(nz) as f64;
+        rows.blocks = match rows.noise > 0.0 {
+            true => seen_blocks(&means, dims, [FAINT / side, FAINT_HAZE / (0.1 * diagonal)]),
+            false => means.iter().map(|mean| *mean > 0.0).collect(),
+        };
+        // More than what makes a block opaque does not count.
         let weights: Vec<f32> = means.iter().map(|mean| mean.min((OPAQUE / side) as f32)).collect();
-        let dims = rows.block_dims();
         take_specks(&mut rows.blocks, dims, &weights, rows.noise);
         rows
     }
@@ -606,6 +626,47 @@ mod tests {
         assert!((half.max.x - 12.5).abs() < 0.6 && half.max.y > 14.0, "{half:?}");
         // If nothing is seen, the box is.
         assert!(visible_bounds(opaque(300.0), &[]).max.x > 31.0);
+    }
+
+    /// A volume of 64 samples a side: an opaque ball in a corner, and values elsewhere.
+    fn seen_beside_a_ball(value: impl Fn(DVec3) -> u8) -> Bounds {
+        let at = |index: usize| {
+            DVec3::new((index % 64) as f64, (index / 64 % 64) as f64, (index / 4096) as f64)
+        };
+        let is_ball = |place: DVec3| place.distance(DVec3::splat(44.0)) < 12.0;
+        let sample = |index| if is_ball(at(index)) { 200 } else { value(at(index)) };
+        let lattice = Lattice::with_spacing([64; 3], DVec3::ONE);
+        let samples = Samples::U8((0..64 * 4096).map(sample).collect());
+        let transfer = TransferFunction {
+            opacity: vec![(0.0, 0.0), (200.0, 0.8)],
+            ..TransferFunction::default()
+        };
+        let volume = Volume::new(lattice, samples).unwrap();
+        ends(&Scene::new().with_volume(volume, Kernel::default(), transfer).seen(&[]).unwrap())
+    }
+
+    #[test]
+    fn dust_and_veils_are_left_out_and_thin_things_are_not() {
+        let ball = seen_beside_a_ball(|_| 0);
+        assert!((ball.min - DVec3::splat(32.0)).abs().max_element() < 1.1, "{ball:?}");
+        // Dust: one sample in some hundreds, all over the volume. A veil: a slice of 1 % opacity.
+        let dust = |place: DVec3| (31.0 * place.x + 17.0 * place.y + 7.0 * place.z) % 383.0 < 1.0;
+        let dusty = seen_beside_a_ball(|place| if dust(place) { 15 } else { 0 });
+        let veiled = seen_beside_a_ball(|place| if place.x < 2.0 { 2 } else { 0 });
+        for bounds in [dusty, veiled] {
+            let far = (bounds.min - ball.min).abs().max((bounds.max - ball.max).abs());
+            assert!(far.max_element() < 1.1, "{bounds:?}");
+        }
+        // An antenna of one sample, spray of eight samples a drop, and fog of 1 % opacity.
+        let is_antenna = |place: DVec3| place.x == 44.0 && place.y == 44.0;
+        let antenna = seen_beside_a_ball(|place| if is_antenna(place) { 200 } else { 0 });
+        assert!(antenna.min.z < 2.1, "{antenna:?}");
+        let is_drop = |place: DVec3| (place % 16.0).max_element() < 2.0;
+        let spray = seen_beside_a_ball(|place| if is_drop(place) { 200 } else { 0 });
+        let fog = seen_beside_a_ball(|_| 4);
+        for bounds in [spray, fog] {
+            assert!(bounds.min.max_element() < 2.1, "{bounds:?}");
+        }
     }
 
     #[test]

@@ -25,6 +25,24 @@ pub(super) fn take_specks(seen: &mut [bool], dims: [usize; 3], weights: &[f32], 
     }
 }
 
+/// Returns for each block of a grid the mean of those up to `reach` blocks away along each axis.
+/// Beyond the grid there is nothing.
+pub(super) fn means_around(means: &[f32], dims: [usize; 3], reach: usize) -> Vec<f32> {
+    let mut sums = means.to_vec();
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    for (count, stride) in dims.into_iter().zip(strides) {
+        let before = sums.clone();
+        for (at, sum) in sums.iter_mut().enumerate() {
+            let place = at / stride % count;
+            let first = at - place.min(reach) * stride;
+            let last = at + (count - 1 - place).min(reach) * stride;
+            *sum = (first..=last).step_by(stride).map(|other| before[other]).sum();
+        }
+    }
+    let count = (2 * reach + 1).pow(3) as f32;
+    sums.iter().map(|sum| sum / count).collect()
+}
+
 /// Returns the parts of the grid, each as the blocks that it consists of.
 fn parts(seen: &[bool], [nx, ny, nz]: [usize; 3]) -> Vec<Vec<usize>> {
     let mut is_visited: Vec<bool> = seen.iter().map(|is_seen| !is_seen).collect();
@@ -82,6 +100,19 @@ mod tests {
         // Too large a part, and a block that touches the cube at a corner.
         assert_eq!(left(&[[0; 3], [1, 0, 0]], 0.1), 127);
         assert_eq!(left(&[[7; 3]], 0.1), 126);
+    }
+
+    #[test]
+    fn means_around_blocks_by_hand() {
+        let mut means = vec![0.0; 4 * 3 * 2];
+        (means[1 + 4], means[3]) = (27.0, 2.7);
+        let around = means_around(&means, [4, 3, 2], 1);
+        let at = |x: usize, y: usize, z: usize| around[x + 4 * (y + 3 * z)];
+        for (place, expected) in [(at(0, 0, 1), 1.0), (at(2, 1, 0), 1.1), (at(3, 1, 1), 0.1)] {
+            assert!((place - expected).abs() < 1e-6, "{place} {expected}");
+        }
+        assert_eq!(at(3, 2, 0), 0.0);
+        assert_eq!(means_around(&means, [4, 3, 2], 0), means);
     }
 
     #[test]

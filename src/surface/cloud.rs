@@ -19,7 +19,7 @@ use crate::{
     splat::{NO_NORMAL, Splat, encode_normal},
 };
 use glam::{DVec3, Vec3};
-use std::f32::consts::PI;
+use std::{collections::HashMap, f32::consts::PI};
 
 /// Standard deviation of a surfel, in units of the median distance to the neighbours. On a square
 /// grid of points that is 1.2 spacings, and 0.39 would be enough; the rest is for irregular point
@@ -35,11 +35,17 @@ const LONE: f32 = 4.0;
 /// surfaces this much more coarsely than near ones.
 const LARGEST: f32 = 16.0;
 
+/// A patch is some neighbouring points whose spacing is more than this many times the median one.
+/// One of fewer than [`FEWEST_IN_PATCH`] points is no surface far from a scanner, but strays: its
+/// points are drawn as wide as the median one.
+const COARSE: f32 = 3.0;
+const FEWEST_IN_PATCH: usize = 50;
+
 /// The name of this module's work in errors.
 const WORK: &str = "finding the neighbours of points";
 /// Bytes of temporary memory per point: the tree, its neighbourhood, the edges of the graph that
 /// orients normals, and its surfel.
-const OF_POINT: u64 = 340;
+const OF_POINT: u64 = 344;
 
 /// The radius of a ball, as a part of the usual distance of points on no surface from their nearest
 /// neighbours: they nearly touch.
@@ -344,7 +350,8 @@ fn gaps(around: &[Surroundings], nearest: &[Nearest], spacing: &[f32]) -> Vec<f3
 }
 
 /// Returns the spacing around each point, and which points are isolated. An isolated point takes
-/// the spacing of its neighbours. `typical` is about the median spacing, if known.
+/// the spacing of its neighbours, and one of a small patch the median spacing. `typical` is about
+/// the median spacing, if known.
 fn spacings(
     around: &[Surroundings],
     nearest: &[Nearest],
@@ -362,7 +369,7 @@ fn spacings(
     let typical = typical.unwrap_or_else(median);
     // A single point has no scale of its own. It becomes a ball of about unit diameter.
     let typical = if typical > 0.0 { typical } else { 0.5 };
-    around
+    let (mut spacing, lone): (Vec<f32>, Vec<bool>) = around
         .par_iter()
         .zip(nearest)
         .map(|(point, nearest)| {
@@ -372,7 +379,45 @@ fn spacings(
             let distance = if lone { usual } else { point.distance.min(usual * WIDER) };
             (if distance > 0.0 { distance.min(typical * LARGEST) } else { typical }, lone)
         })
-        .unzip()
+        .unzip();
+    for at in in_small_patches(&spacing, nearest, typical * COARSE) {
+        spacing[at as usize] = typical;
+    }
+    (spacing, lone)
+}
+
+/// Returns the points of small patches: of fewer than [`FEWEST_IN_PATCH`] points that are joined by
+/// being neighbours, and whose spacing is above `coarse`.
+fn in_small_patches(spacing: &[f32], nearest: &[Nearest], coarse: f32) -> Vec<u32> {
+    let is_coarse = |at: u32| spacing[at as usize] > coarse;
+    let mut found: Vec<u32> =
+        (0..spacing.len() as u32).into_par_iter().filter(|&at| is_coarse(at)).collect();
+    // A cloud this small shows too little.
+    if found.is_empty() || spacing.len() < FEWEST_IN_PATCH {
+        return Vec::new();
+    }
+    let mut parents: Vec<u32> = (0..spacing.len() as u32).collect();
+    for &at in &found {
+        for &other in nearest[at as usize].iter().filter(|&&other| is_coarse(other)) {
+            let [a, b] = [at, other].map(|at| root(&mut parents, at));
+            parents[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut sizes = HashMap::new();
+    for &at in &found {
+        *sizes.entry(root(&mut parents, at)).or_insert(0usize) += 1;
+    }
+    found.retain(|&at| sizes[&root(&mut parents, at)] < FEWEST_IN_PATCH);
+    found
+}
+
+/// Returns the first point of the patch of a point, and shortens the way to it.
+fn root(parents: &mut [u32], mut at: u32) -> u32 {
+    while parents[at as usize] != at {
+        parents[at as usize] = parents[parents[at as usize] as usize];
+        at = parents[at as usize];
+    }
+    at
 }
 
 /// Sets the normals that the file has, and turns normals towards the scanner that saw the point.

@@ -104,6 +104,26 @@ fn what_a_scanner_saw_faces_it_and_what_the_file_says_stays() {
 }
 
 #[test]
+fn strays_that_are_neighbours_are_small_and_coarse_sheets_stay_closed() {
+    let width = |splat: &Splat| splat.factor.iter().fold(0f32, |most, part| most.max(part.abs()));
+    let widths = |others: Vec<Vec3>| -> Vec<f32> {
+        let mesh = cloud([sheet(0.0), others].concat());
+        all_surfels(&mesh, &SurfelOptions::default()).iter().map(width).collect()
+    };
+    let widest = |widths: &[f32]| widths.iter().copied().fold(0.0, f32::max);
+    // Twenty points, about 8 from each other.
+    let mut random = random();
+    let mut place = || Vec3::new(random(), random(), random()) * 25.0 + Vec3::Z * 40.0;
+    let strays = widths((0..20).map(|_| place()).collect());
+    assert!(widest(&strays[2500..]) <= widest(&strays[..2500]), "{:?}", &strays[2500..]);
+    // A sheet of a hundred points, 8 from each other.
+    let coarse = |at: usize| Vec3::new((at % 10) as f32, (at / 10) as f32, 0.0) * 8.0;
+    let sheets = widths((0..100).map(|at| coarse(at) + Vec3::Z * 90.0).collect());
+    let narrowest = sheets[2500..].iter().copied().fold(f32::INFINITY, f32::min);
+    assert!(narrowest > 3.0 * widest(&sheets[..2500]), "{narrowest}");
+}
+
+#[test]
 fn lone_points_are_small_and_change_no_others() {
     let plain = cloud(sheet(0.0));
     let options = SurfelOptions::default();
