@@ -28,6 +28,8 @@ struct Frame {
     // The lamp of surfaces beside the eye: the direction to it, as long as the factor on the
     // normal's cosine. Last, the factor on the cosine to the eye.
     surface_sides: vec4<f32>,
+    // The direction in which a surface shows the highlight; zero if that is the eye's.
+    surface_half: vec4<f32>,
     // Axis-aligned sheets: their normal in view space.
     sheet_normal: vec4<f32>,
     // The first record word of each field in the pass. The fields' records lie behind those of

@@ -51,14 +51,14 @@ fn from_the_eye(normal: vec3<f32>, direction: vec3<f32>) -> vec2<f32> {
 // The same with light from beside the eye.
 fn from_sides(normal: vec3<f32>, direction: vec3<f32>) -> vec2<f32> {
     let facing = from_the_eye(normal, direction).x;
-    let lamp = frame.surface_sides.xyz;
-    let towards = dot(lamp, turned(normal, direction, CERTAIN));
-    // The highlight is that of a lamp between both.
-    let eye = 2.0 * frame.surface_sides.w + length(lamp);
-    let half = max(length(lamp - eye * direction), 1e-6);
+    let way = turned(normal, direction, CERTAIN);
+    let half = frame.surface_half.xyz;
+    // A surface that is seen from its edge may be turned to the eye by either side.
+    let counts = min(10.0 * facing, 1.0);
+    let towards = counts * max(dot(frame.surface_sides.xyz, way), 0.0);
     return vec2(
-        min(frame.surface_sides.w * facing + max(towards, 0.0), 1.0),
-        clamp((eye * facing + towards) / half, 0.0, 1.0),
+        min(frame.surface_sides.w * facing + towards, 1.0),
+        select(facing, clamp(dot(half, way), 0.0, 1.0), any(half != vec3(0.0))),
     );
 }
 
@@ -144,6 +144,15 @@ fn lit_piece(
     return min(color * light.x + light.y, vec3(1.0));
 }
 
+// Returns the light that reaches a place in a sheet.
+fn reaching_in(medium: Medium, place: f32) -> Reaching {
+    return Reaching(
+        mix(medium.reaching.side, medium.beyond.side, place),
+        mix(medium.reaching.open, medium.beyond.open, place),
+        mix(medium.reaching.key, medium.beyond.key, place),
+    );
+}
+
 // Returns the light of the field at a place in a sheet.
 fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
     let gradient = gradient_at(r, f, medium, place);
@@ -151,7 +160,7 @@ fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
     let shade = frame.fields[f].shade;
     let certain = vec3(frame.fields[f].certain.xy, medium.share);
     let eye = from_the_eye(gradient, direction);
-    return light_of(gradient, direction, eye, shade, certain, medium.reaching);
+    return light_of(gradient, direction, eye, shade, certain, reaching_in(medium, place));
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -246,8 +255,9 @@ struct Medium {
     // ray at the front, in the middle and at the back.
     inside: vec2<f32>,
     along: vec3<f32>,
-    // The light that reaches the middle of the sheet.
+    // The light that reaches the front of the sheet, and its back.
     reaching: Reaching,
+    beyond: Reaching,
     // How far gradients count behind a clip.
     share: f32,
     // The largest value.
@@ -392,7 +402,8 @@ fn pass_surface(
     var color = surface.color.xyz;
     if VOLUME_SHADED {
         let gradient = gradient_at(r, f, *medium, place);
-        color = lit_field(r, f, color, gradient, (*medium).share, (*medium).reaching);
+        let reaching = reaching_in(*medium, place);
+        color = lit_field(r, f, color, gradient, (*medium).share, reaching);
     }
     (*medium).color += share * color;
 }
@@ -438,7 +449,8 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
             + towards_eye(r, gradient_at(r, f, medium, 0.5))
             + towards_eye(r, gradient_at(r, f, medium, 1.0))) / 3.0;
         let normal = medium.share * turned(mean, direction_of(r), certain);
-        medium.reaching = reaching_at(r, planes[sheet] + 0.5 * medium.thickness, normal);
+        medium.reaching = reaching_at(r, planes[sheet], normal);
+        medium.beyond = reaching_at(r, planes[sheet + 1u], normal);
     }
     var begin = max(planes[sheet], pixels[r].fields[f].inside.x);
     let last = min(planes[sheet + 1u], pixels[r].fields[f].inside.y);

@@ -3,7 +3,7 @@
 //! `src/reference` has the definition; shaders/shared/sheet.wgsl does the same.
 
 use super::{
-    lamps::{Reaching, with_light},
+    lamps::{ReachingSheet, with_light},
     layer::{Layer, PARTS},
     plan::Plan,
     rays::Rays,
@@ -267,15 +267,14 @@ impl Plan<'_> {
         &self,
         simd: S,
         color: [Lanes<S>; 3],
-        (layer, reaching): (&Layer<S>, &Reaching<S>),
+        (layer, reaching): (&Layer<S>, &ReachingSheet<S>),
         [place, next_place]: [Lanes<S>; 2],
         is_steady: bool,
     ) -> [Lanes<S>; 3] {
-        let on = (layer.direction, reaching);
         if is_steady {
             let middle = (place + next_place) * 0.5;
             let gradient = (self.gradient(layer, middle), layer.share);
-            return self.lit_field(simd, color, gradient, on);
+            return self.lit_field(simd, color, gradient, (layer.direction, &reaching.at(middle)));
         }
         let none = Lanes::splat(simd, 0.0);
         let mut sums = [none; 2];
@@ -283,7 +282,7 @@ impl Plan<'_> {
             let share = (number as f32 + 0.5) / LIGHTS as f32;
             let at = (next_place - place) * share + place;
             let gradient = (self.gradient(layer, at), layer.share);
-            let light = self.light_of(simd, gradient, on);
+            let light = self.light_of(simd, gradient, (layer.direction, &reaching.at(at)));
             sums = [sums[0] + light[0], sums[1] + light[1]];
         }
         let [share, highlight] = sums.map(|sum| sum * (1.0 / LIGHTS as f32));
@@ -379,7 +378,7 @@ impl Plan<'_> {
     fn pass<S: Simd>(
         &self,
         simd: S,
-        (layer, reaching): (&Layer<S>, &Reaching<S>),
+        (layer, reaching): (&Layer<S>, &ReachingSheet<S>),
         rays: &Rays<S>,
         mask: mask32x8<S>,
         before: Lanes<S>,
@@ -454,7 +453,7 @@ impl Plan<'_> {
     fn pass_between<S: Simd>(
         &self,
         simd: S,
-        (layer, reaching): (&Layer<S>, &Reaching<S>),
+        (layer, reaching): (&Layer<S>, &ReachingSheet<S>),
         [begin, end]: [Lanes<S>; 2],
         mask: mask32x8<S>,
         medium: &mut Medium<S>,
@@ -526,7 +525,7 @@ impl Plan<'_> {
     fn pass_piece<S: Simd>(
         &self,
         simd: S,
-        (layer, reaching): (&Layer<S>, &Reaching<S>),
+        (layer, reaching): (&Layer<S>, &ReachingSheet<S>),
         piece: &Piece<S>,
         medium: &mut Medium<S>,
     ) {
@@ -565,7 +564,8 @@ impl Plan<'_> {
             if self.is_lit {
                 let at = place + (next_place - place) * share;
                 let normal = (self.gradient(layer, at), layer.share);
-                surface = self.lit_field(simd, surface, normal, (layer.direction, reaching));
+                let on = (layer.direction, &reaching.at(at));
+                surface = self.lit_field(simd, surface, normal, on);
             }
             for (sum, channel) in medium.color.iter_mut().zip(surface) {
                 *sum = taken.mul_add(channel, *sum);
@@ -581,7 +581,7 @@ impl Plan<'_> {
     fn color_and_depth<S: Simd>(
         &self,
         simd: S,
-        (layer, reaching): (&Layer<S>, &Reaching<S>),
+        (layer, reaching): (&Layer<S>, &ReachingSheet<S>),
         piece: &Piece<S>,
         left: Lanes<S>,
     ) -> Option<([Lanes<S>; 3], Lanes<S>)> {

@@ -5,13 +5,14 @@ use super::{
     layer::Layer,
     plan::Plan,
     rays::Rays,
-    vector::{self, Lanes, columns, dot, dot_with, each, three},
+    vector::{self, Lanes, columns, dot, dot_with, each, four, three},
 };
 use crate::plan::{
     frame::{Light, Sides},
     lamps::{Affine, Lamps, Openness, ShadowMap},
 };
 use fearless_simd::{Simd, f32x4, prelude::*};
+use glam::Vec3;
 
 /// A shorter gradient has no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
@@ -23,6 +24,23 @@ pub struct Reaching<S: Simd> {
     open: [Lanes<S>; 4],
     /// The share of the key lamp's light.
     key: Lanes<S>,
+}
+
+/// The light that reaches eight places at the front of a sheet, and at its back.
+#[derive(Clone, Copy)]
+pub struct ReachingSheet<S: Simd>([Reaching<S>; 2]);
+
+impl<S: Simd> ReachingSheet<S> {
+    /// Returns the light at places in the sheet, from 0 at its front to 1 at its back.
+    #[inline(always)]
+    pub fn at(&self, place: Lanes<S>) -> Reaching<S> {
+        let [front, back] = &self.0;
+        let mixed = |front: Lanes<S>, back: Lanes<S>| (back - front).mul_add(place, front);
+        Reaching {
+            open: four!(I => mixed(front.open[I], back.open[I])),
+            key: mixed(front.key, back.key),
+        }
+    }
 }
 
 impl<S: Simd> Reaching<S> {
@@ -175,18 +193,16 @@ impl<S: Simd> Turned<S> {
     /// Returns the share of the light from the eye and from beside it that a surface gets, and the
     /// cosine of its highlight.
     #[inline(always)]
-    fn from_sides(&self, simd: S, sides: &Sides, direction: &[Lanes<S>; 3]) -> [Lanes<S>; 2] {
+    fn lit_by_sides(&self, simd: S, Sides { eye, lamp, half }: Sides) -> [Lanes<S>; 2] {
+        if half == Vec3::ZERO {
+            return [self.facing; 2];
+        }
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let (lamp, size) = (sides.lamp.to_array(), sides.lamp.length());
-        let towards = dot_with(lamp, self.normal);
-        let light = self.facing.mul_add(sides.eye, towards.max(none)).min(one);
-        // The highlight is that of a lamp between both.
-        let eye = Lanes::splat(simd, 2.0 * sides.eye + size);
-        let along = dot_with(lamp, *direction);
-        let size2 = (along * -2.0 + eye).mul_add(eye, Lanes::splat(simd, size * size));
-        let inverse = one / size2.max(Lanes::splat(simd, 1e-12)).sqrt();
-        let cosine = (self.facing.mul_add(eye, towards) * inverse).max(none).min(one);
-        [light, cosine]
+        let towards = dot_with(lamp.to_array(), self.normal).max(none);
+        // A surface that is seen from its edge may be turned to the eye by either side.
+        let counts = (self.facing * 10.0).min(one);
+        let light = self.facing.mul_add(eye, towards * counts).min(one);
+        [light, dot_with(half.to_array(), self.normal).min(one)]
     }
 
     /// Returns the factor on a colour, and the highlight that is added to it (Blinn 1977). `eye`
@@ -243,21 +259,22 @@ impl Plan<'_> {
         let turned = Turned::new(simd, normal, rays.direction, [0.0, 1e30], None);
         let reaching = Reaching::at(simd, self, rays, distance, &turned);
         let on = (&rays.direction, &reaching);
-        let eye = turned.from_sides(simd, &self.frame.surface_sides, &rays.direction);
+        let eye = turned.lit_by_sides(simd, self.frame.surface_sides);
         let light = (self.frame.surface_light, eye);
         let [share, highlight] = turned.light(simd, light, self.lamps.as_ref(), on);
         with_light(simd, color, share, highlight)
     }
 
-    /// Returns the light that reaches the middle of a sheet of the field.
+    /// Returns the light that reaches a sheet of the field.
     #[inline(always)]
-    pub fn reaching<S: Simd>(&self, simd: S, layer: &Layer<S>, rays: &Rays<S>) -> Reaching<S> {
+    pub fn reaching<S: Simd>(&self, simd: S, layer: &Layer<S>, rays: &Rays<S>) -> ReachingSheet<S> {
         if self.lamps.is_none() || !self.is_lit {
-            return Reaching::all(simd);
+            return ReachingSheet([Reaching::all(simd); 2]);
         }
         let gradient = self.towards_eye(simd, layer);
         let turned = Turned::new(simd, gradient, layer.direction, self.certain(), layer.share);
-        Reaching::at(simd, self, rays, layer.thickness.mul_add(0.5, layer.start), &turned)
+        let at = |distance| Reaching::at(simd, self, rays, distance, &turned);
+        ReachingSheet([at(layer.start), at(layer.start + layer.thickness)])
     }
 
     /// Returns the mean of the gradients at the front, in the middle and at the back of a sheet,

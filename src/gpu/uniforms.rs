@@ -37,6 +37,7 @@ pub struct Frame {
     pub entry_capacity: u32,
     pub surface_shade: [f32; 4],
     pub surface_sides: [f32; 4],
+    pub surface_half: [f32; 4],
     pub sheet_normal: [f32; 4],
     /// Set on the GPU, before march.
     pub record_starts: [[u32; 4]; Scene::MAX_FIELDS / 4],
@@ -176,6 +177,7 @@ impl Frame {
             z_near: frame.z_near,
             surface_shade: shade(frame.surface_light),
             surface_sides: wide_with(frame.surface_sides.lamp.to_array(), frame.surface_sides.eye),
+            surface_half: wide(frame.surface_sides.half),
             sheet_normal: wide(frame.sheet_normal),
             world_x: wide(frame.to_world.x_axis),
             world_y: wide(frame.to_world.y_axis),

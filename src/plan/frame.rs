@@ -64,12 +64,14 @@ pub struct Sides {
     pub eye: f32,
     /// The direction to the lamp in view space. Its length is the factor on the normal's cosine.
     pub lamp: Vec3,
+    /// The direction in which a surface shows the highlight; zero if that is the eye's.
+    pub half: Vec3,
 }
 
 impl Default for Sides {
     /// All light comes from the eye.
     fn default() -> Self {
-        Self { eye: 1.0, lamp: Vec3::ZERO }
+        Self { eye: 1.0, lamp: Vec3::ZERO, half: Vec3::ZERO }
     }
 }
 
@@ -79,7 +81,13 @@ impl Sides {
     fn new(Aside { direction, share }: Aside) -> Self {
         let (lamp, eye) = (share * direction.normalize(), 1.0 - share);
         let brightest = (lamp - eye * DVec3::Z).length();
-        Self { eye: (eye / brightest) as f32, lamp: (lamp / brightest).as_vec3() }
+        // The half vector of a lamp between both, in the middle of the picture.
+        let half = (lamp - (1.0 + eye) * DVec3::Z).normalize();
+        Self {
+            eye: (eye / brightest) as f32,
+            lamp: (lamp / brightest).as_vec3(),
+            half: half.as_vec3(),
+        }
     }
 }
 

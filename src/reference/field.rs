@@ -5,9 +5,12 @@ use super::{
     composite::{Medium, Step},
     lamps::Lamps,
     ray::Ray,
-    shade::{self, Lit},
+    shade::{self, Lit, Reaching},
 };
-use crate::volume::{Isosurface, Lattice, Shade};
+use crate::{
+    scene::Lighting,
+    volume::{Isosurface, Lattice, Shade},
+};
 use glam::DVec3;
 
 /// The scalar field of a scene, classified after interpolation.
@@ -43,10 +46,10 @@ pub(super) struct Layer {
 /// The field in a sheet, and the parts of the ray where it counts.
 pub(super) type ClippedLayer = (Layer, Vec<[f64; 2]>);
 
-/// How a field is lit in a sheet: all of it by the light that reaches the sheet's middle.
+/// How a field is lit in a sheet: by light that is linear between what reaches the sheet's faces.
 struct LitBy<'a> {
     shade: Option<&'a Shade>,
-    lamps: Lit,
+    lamps: Option<(Lighting, [Reaching; 2])>,
 }
 
 impl<'a> LitBy<'a> {
@@ -54,17 +57,22 @@ impl<'a> LitBy<'a> {
         let shade = field.shade.as_ref();
         let lamps = lamps.zip(shade).map(|(lamps, shade)| {
             let gradient = layer.towards_eye(ray.direction);
-            let at = (ray, layer.distance(0.5));
             let gradient = (gradient, layer.share());
-            (lamps.lighting, lamps.reaching(gradient, at, shade))
+            let at = |u| lamps.reaching(gradient, (ray, layer.distance(u)), shade);
+            (lamps.lighting, [at(0.0), at(1.0)])
         });
         Self { shade, lamps }
     }
 
+    /// Returns the light at a place.
+    fn at(&self, u: f64) -> Lit {
+        self.lamps.map(|(lighting, [front, back])| (lighting, front.mixed(&back, u)))
+    }
+
     /// Returns a colour at a place with a gradient.
-    fn one(&self, color: DVec3, gradient: (DVec3, f64), direction: DVec3) -> DVec3 {
+    fn one(&self, color: DVec3, gradient: (DVec3, f64), (u, direction): (f64, DVec3)) -> DVec3 {
         self.shade.map_or(color, |shade| {
-            shade::with_light(color, shade::light(gradient, (direction, None), shade, &self.lamps))
+            shade::with_light(color, shade::light(gradient, (direction, None), shade, &self.at(u)))
         })
     }
 }
@@ -159,7 +167,7 @@ impl Layer {
             let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
             let at = start + share * (end - start);
             let gradient = (self.gradient(at, direction), self.share());
-            let light = shade::light(gradient, (direction, None), shade, &lit.lamps);
+            let light = shade::light(gradient, (direction, None), shade, &lit.at(at));
             (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
         }
         shade::with_light(color, sums)
@@ -242,7 +250,8 @@ impl Layer {
                 });
                 if let Some(surface) = surface {
                     let gradient = (self.gradient(at(share), direction), self.share());
-                    let lit = lit_by.one(DVec3::from(surface.color), gradient, direction);
+                    let on = (at(share), direction);
+                    let lit = lit_by.one(DVec3::from(surface.color), gradient, on);
                     color += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;
                     let depth = -(1.0 - surface.opacity).ln();

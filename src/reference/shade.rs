@@ -17,6 +17,19 @@ pub(super) struct Reaching {
     pub key: f64,
 }
 
+impl Reaching {
+    /// Returns the light between this place and another.
+    pub fn mixed(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Self {
+            side: self.side.lerp(other.side, share),
+            clear_side: self.clear_side,
+            open: mix(self.open, other.open),
+            key: mix(self.key, other.key),
+        }
+    }
+}
+
 /// The lights of a picture, and what of them reaches a place.
 pub(super) type Lit = Option<(Lighting, Reaching)>;
 
@@ -42,11 +55,13 @@ fn from_the_eye(normal: DVec3, ray: DVec3, aside: Option<&Aside>) -> [f64; 2] {
     // The light comes from the eye, so the half vector is the light's own direction.
     let Some(Aside { direction, share }) = aside else { return [facing; 2] };
     let towards = direction.normalize();
-    let light = (1.0 - share) * facing + share * normal.dot(towards).max(0.0);
+    // A surface that is seen from its edge may be turned to the eye by either side.
+    let counts = (10.0 * facing).min(1.0);
+    let light = (1.0 - share) * facing + counts * share * normal.dot(towards).max(0.0);
     // The brightest place of a ball on the optical axis has the light 1.
     let brightest = ((1.0 - share) * DVec3::NEG_Z + share * towards).length();
-    // The half vector of a lamp between both.
-    let half = (share * towards - (2.0 - share) * ray).normalize_or_zero();
+    // The half vector of a lamp between both, in the middle of the picture.
+    let half = (share * towards - (2.0 - share) * DVec3::Z).normalize();
     [(light / brightest).min(1.0), normal.dot(half).max(0.0)]
 }
 
@@ -158,13 +173,19 @@ mod tests {
         // Half of the light is 0.5 of the brightest, which is half the diagonal of a square. The
         // half vector is three parts of the eye's direction and one of the lamp's.
         close(light(DVec3::NEG_Z, left, 0.5), [0.1 + 0.5 * half, 0.2 * 0.9]);
-        close(light(DVec3::NEG_X, left, 0.5), [0.1 + 0.5 * half, 0.2 * 0.1]);
+        // Where the surface is seen from its edge, the lamp does not count.
+        close(light(DVec3::NEG_X, left, 0.5), [0.1, 0.2 * 0.1]);
+        let edge = DVec3::new(-1.0, 0.0, -0.05).normalize();
+        let cosine = -edge.z;
+        let expected = 0.5 * (cosine + 10.0 * cosine * -edge.x) / half;
+        assert!((light(edge, left, 0.5)[0] - (0.1 + 0.5 * expected)).abs() < 1e-12);
         // What faces away from the lamp only has the eye's, on both sides.
         for normal in [DVec3::new(1.0, 0.0, -1.0), DVec3::new(-1.0, 0.0, 1.0)] {
             close(light(normal, left, 0.5), [0.1 + 0.5 * 0.5, 0.2 * 0.2]);
         }
         // All of it from the lamp.
-        close(light(DVec3::NEG_X, left, 1.0), [0.6, 0.2 * 0.5]);
+        let slant = DVec3::new(-1.0, 0.0, -1.0);
+        close(light(slant, left, 1.0), [0.1 + 0.5 * half, 0.2]);
         close(light(DVec3::ZERO, left, 0.5), [0.6, 0.0]);
     }
 

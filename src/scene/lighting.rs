@@ -171,7 +171,7 @@ impl Lighting {
             if !(0.0..=1.0).contains(&share) {
                 return Err(format!("the share of the light `aside` is {share}, not 0 to 1"));
             }
-            if !(direction.z <= 0.0) {
+            if direction.z > 0.0 {
                 return Err("the lamp of the light `aside` is behind the scene".into());
             }
         }

@@ -60,9 +60,10 @@ impl Scene {
     /// diagonals, and a twentieth beyond 20 diagonals. Of trained scenes the background too, a
     /// fifth beyond 1.5 diagonals if it lies all around.
     ///
-    /// So are specks of a volume apart from the rest, up to a thousandth of what is seen, and dust
-    /// and veils that take less than about a tenth of the light, unless all is that faint. The time
-    /// is linear in the number of splats and samples; of large hierarchies and bricks only coarse
+    /// So are specks of a volume apart from the rest, up to a thousandth of what is seen. Dust and
+    /// veils that take less than about a tenth of the light are too, unless all is that faint.
+    ///
+    /// The time is linear in the number of splats and samples; of large hierarchies and bricks only coarse
     /// levels are read. If an item shows nothing, or the clips remove it, the corners of its box
     /// stand for it.
     ///
