@@ -222,8 +222,8 @@
 //!
 //! Radiance and facets have a part of that light from a lamp beside the eye (`aside` of
 //! [`Lighting`](crate::scene::Lighting)), with the share s and the direction l. b̂ is the direction
-//! from the eye, and a the optical axis. The cosine then is (1 − s)·|n·b̂| + s·t·max(n·l, 0) divided
-//! by |s·l − (1 − s)·a|, at most 1: on a ball on the axis, the brightest place has 1.
+//! from the eye, and a the optical axis. The cosine then is (1 − s)·|n·b̂| + s·t·max(n·l, 0),
+//! divided by |s·l − (1 − s)·a|, at most 1: on a ball on the axis, the brightest place has 1.
 //!
 //! With t = min(10·|n·b̂|, 1), nothing jumps where a surface turns from one side to the other. The
 //! highlight is that of the half vector s·l − (2 − s)·a, for all rays. Samples that are classified
@@ -247,10 +247,10 @@
 //! the lamp's light.
 //!
 //! These are taken at a place before the surface: 2.5 times the step of their lattice along
-//! c·n − (1 − c)·b̂. The surface is a facet at its own distance, the radiance of a sheet in its
-//! middle, or a field at both faces of its sheet; between these, v, w and S are linear. A field's
-//! normal is there the mean of its gradients at the front, in the middle and at the back, each
-//! turned to the eye.
+//! c·n − (1 − c)·b̂. The surface is a facet at its own distance, or the radiance of a sheet in its
+//! middle. A field has them at both faces of its sheet, and v, w and S are linear between these. A
+//! field's normal is there the mean of its gradients at the front, in the middle and at the back,
+//! each turned to the eye.
 //!
 //! T and S come from maps: pictures along the light, in a cube of as many planes as pixels around
 //! the scene. In a map each sheet meets all of the light. Its optical depth, 16 at most, grows

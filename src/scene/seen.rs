@@ -63,9 +63,9 @@ impl Scene {
     /// So are specks of a volume apart from the rest, up to a thousandth of what is seen. Dust and
     /// veils that take less than about a tenth of the light are too, unless all is that faint.
     ///
-    /// The time is linear in the number of splats and samples; of large hierarchies and bricks only coarse
-    /// levels are read. If an item shows nothing, or the clips remove it, the corners of its box
-    /// stand for it.
+    /// The time is linear in the number of splats and samples; of large hierarchies and bricks only
+    /// coarse levels are read. If an item shows nothing, or the clips remove it, the corners of its
+    /// box stand for it.
     ///
     /// # Errors
     /// Those of reading pages and bricks.

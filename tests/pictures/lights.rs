@@ -148,8 +148,8 @@ fn at(picture: &Picture, [x, y]: [f64; 2]) -> f64 {
     f64::from(picture.color[pixel[1] * 64 + pixel[0]][0])
 }
 
-/// A white prism around the y axis, as high as it is wide: its mesh, and the normal and the middle of
-/// each of its sides and of its top.
+/// A white prism around the y axis, as high as it is wide: its mesh, and the normal and the middle
+/// of each of its sides and of its top.
 fn prism(sides: u32, turn: f64) -> (Mesh, Vec<[DVec3; 2]>) {
     let at = |side: f64, y: f64| {
         let angle = std::f64::consts::TAU * side / f64::from(sides) + turn.to_radians();

@@ -130,7 +130,8 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
         size, tiles, center, scale, perspective, sheet_count, geometric_sheets, ratio_log2_inverse,
         step_inverse, z_near, tile_shift, record_capacity, entry_capacity, surface_shade,
         surface_sides, surface_half, sheet_normal, record_starts, world_x, world_y, world_z,
-        lamp_shares, lamp_steps, key_direction, sky_side, open_x, open_y, open_z, key_x, key_y, key_z, clips, holes, fields,
+        lamp_shares, lamp_steps, key_direction, sky_side, open_x, open_y, open_z, key_x, key_y,
+        key_z, clips, holes, fields,
     );
     let field = layout!(FrameField:
         axis_x, axis_y, axis_z, origin, low, high, shade, certain, isotropic, transfer, gradients,
