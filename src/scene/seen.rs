@@ -399,9 +399,10 @@ impl<'a> Rows<'a> {
         let (means, dims) = (rows.block_means(), rows.block_dims());
         let diagonal = volume.bounds().diagonal();
         let side = diagonal * BLOCK as f64 / nx.max(ny).max(nz) as f64;
-        rows.blocks = match rows.noise > 0.0 {
-            true => seen_blocks(&means, dims, [FAINT / side, FAINT_HAZE / (0.1 * diagonal)]),
-            false => means.iter().map(|mean| *mean > 0.0).collect(),
+        rows.blocks = if rows.noise > 0.0 {
+            seen_blocks(&means, dims, [FAINT / side, FAINT_HAZE / (0.1 * diagonal)])
+        } else {
+            means.iter().map(|mean| *mean > 0.0).collect()
         };
         // More than what makes a block opaque does not count.
         let weights: Vec<f32> = means.iter().map(|mean| mean.min((OPAQUE / side) as f32)).collect();
