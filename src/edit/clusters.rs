@@ -9,7 +9,11 @@
 //! all: the parts of a scan that are far from its scanner are sparse.
 
 use super::Context;
-use crate::{Error, Result, math::neighbours::Neighbours, parallel::prelude::*};
+use crate::{
+    Error, Result,
+    math::{neighbours::Neighbours, sets::Sets},
+    parallel::prelude::*,
+};
 use glam::Vec3;
 
 /// The number of neighbours.
@@ -119,29 +123,6 @@ fn quantile(mut numbers: Vec<f32>, share: f64) -> f32 {
     let rank = (numbers.len() as f64 * share).ceil() as usize;
     let at = rank.clamp(1, numbers.len()) - 1;
     *numbers.select_nth_unstable_by(at, f32::total_cmp).1
-}
-
-/// Disjoint sets, each with its least member as the root.
-pub(super) struct Sets(Vec<u32>);
-
-impl Sets {
-    pub fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    pub fn root(&mut self, mut member: u32) -> u32 {
-        while self.0[member as usize] != member {
-            let above = self.0[self.0[member as usize] as usize];
-            self.0[member as usize] = above;
-            member = above;
-        }
-        member
-    }
-
-    pub fn join(&mut self, one: u32, other: u32) {
-        let (one, other) = (self.root(one), self.root(other));
-        self.0[one.max(other) as usize] = one.min(other);
-    }
 }
 
 #[cfg(test)]

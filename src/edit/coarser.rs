@@ -4,8 +4,10 @@
 //! neighbourhoods that meet in a triangle make a new one: the dual of a Voronoi diagram on the
 //! surface (Valette & Chassery 2004). Parts that hold no kept place vanish.
 
-use super::clusters::Sets;
-use crate::{math::neighbours::Neighbours, surface::Mesh};
+use crate::{
+    math::{neighbours::Neighbours, sets::Sets},
+    surface::Mesh,
+};
 use glam::Vec3;
 use std::{
     cmp::Reverse,

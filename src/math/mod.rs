@@ -14,6 +14,7 @@ mod matrices;
 pub(crate) mod neighbours;
 mod path;
 mod pose;
+pub(crate) mod sets;
 mod sheets;
 pub(crate) mod weld;
 

@@ -39,11 +39,11 @@ const NOISE: f64 = 0.001;
 /// A block of samples is seen if it absorbs this share of the light that passes through it.
 const FAINT: f64 = 0.1;
 
-/// So are fainter ones in haze: if a tenth of the volume's diagonal, as dense as the blocks around
-/// one are in the mean, has this optical depth. Dust and veils have less.
+/// A fainter block is seen if it is part of a haze: a tenth of the volume's diagonal, filled with
+/// the mean of the blocks around it, has this optical depth. Dust and veils have less.
 const FAINT_HAZE: f64 = 0.15;
 
-/// The blocks around a block: one in so many of the longest side, to each side of it.
+/// The blocks around a block reach one part in so many of the longest side, in each direction.
 const AROUND: usize = 24;
 
 /// The optical depth of a block of samples that is opaque.

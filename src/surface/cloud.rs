@@ -13,7 +13,7 @@ use crate::{
     Result,
     deadline::Clock,
     facet::{Facet, REACH, Relief, Rod, Size},
-    math::{eigen, lower, neighbours::Neighbours},
+    math::{eigen, lower, neighbours::Neighbours, sets::Sets},
     memory,
     parallel::prelude::*,
     splat::{NO_NORMAL, Splat, encode_normal},
@@ -396,28 +396,18 @@ fn in_small_patches(spacing: &[f32], nearest: &[Nearest], coarse: f32) -> Vec<u3
     if found.is_empty() || spacing.len() < FEWEST_IN_PATCH {
         return Vec::new();
     }
-    let mut parents: Vec<u32> = (0..spacing.len() as u32).collect();
+    let mut patches = Sets::new(spacing.len());
     for &at in &found {
         for &other in nearest[at as usize].iter().filter(|&&other| is_coarse(other)) {
-            let [a, b] = [at, other].map(|at| root(&mut parents, at));
-            parents[a.max(b) as usize] = a.min(b);
+            patches.join(at, other);
         }
     }
     let mut sizes = HashMap::new();
     for &at in &found {
-        *sizes.entry(root(&mut parents, at)).or_insert(0usize) += 1;
+        *sizes.entry(patches.root(at)).or_insert(0usize) += 1;
     }
-    found.retain(|&at| sizes[&root(&mut parents, at)] < FEWEST_IN_PATCH);
+    found.retain(|&at| sizes[&patches.root(at)] < FEWEST_IN_PATCH);
     found
-}
-
-/// Returns the first point of the patch of a point, and shortens the way to it.
-fn root(parents: &mut [u32], mut at: u32) -> u32 {
-    while parents[at as usize] != at {
-        parents[at as usize] = parents[parents[at as usize] as usize];
-        at = parents[at as usize];
-    }
-    at
 }
 
 /// Sets the normals that the file has, and turns normals towards the scanner that saw the point.
