@@ -3,7 +3,7 @@
 //! `src/reference` has the definition; shaders/shared/sheet.wgsl does the same.
 
 use super::{
-    lamps::{ReachingSheet, with_light},
+    lamps::ReachingSheet,
     layer::{Layer, PARTS},
     plan::Plan,
     rays::Rays,
@@ -19,8 +19,6 @@ use crate::{
 };
 use fearless_simd::{Simd, f32x4, mask32x8, prelude::*};
 
-/// Number of places in a part at which its light is taken.
-const LIGHTS: usize = 4;
 /// The same for values far beyond the table, as a fraction of the value.
 const NARROW_AFAR: f32 = 1e-6;
 /// One light stands for a piece if the square of the relative change of its gradient, times the
@@ -260,8 +258,8 @@ impl Plan<'_> {
         at.map(factor).simd_into(simd)
     }
 
-    /// Returns the colour of a piece in its mean light: gradients change more within a piece than
-    /// values do. If the light is steady, that of the middle stands for it.
+    /// Returns the colour of a piece in its mean light, that of four places: gradients change more
+    /// within a piece than values do. If the light is steady, that of the middle stands for it.
     #[inline(always)]
     fn lit_piece<S: Simd>(
         &self,
@@ -276,17 +274,10 @@ impl Plan<'_> {
             let gradient = (self.gradient(layer, middle), layer.share);
             return self.lit_field(simd, color, gradient, (layer.direction, &reaching.at(middle)));
         }
-        let none = Lanes::splat(simd, 0.0);
-        let mut sums = [none; 2];
-        for number in 0..LIGHTS {
-            let share = (number as f32 + 0.5) / LIGHTS as f32;
-            let at = (next_place - place) * share + place;
-            let gradient = (self.gradient(layer, at), layer.share);
-            let light = self.light_of(simd, gradient, (layer.direction, &reaching.at(at)));
-            sums = [sums[0] + light[0], sums[1] + light[1]];
-        }
-        let [share, highlight] = sums.map(|sum| sum * (1.0 / LIGHTS as f32));
-        with_light(simd, color, share, highlight)
+        let at = four!(N => (next_place - place) * ((N as f32 + 0.5) * 0.25) + place);
+        let gradients = (four!(N => self.gradient(layer, at[N])), layer.share);
+        let on = (layer.direction, four!(N => reaching.at(at[N])));
+        self.lit_by_four(simd, color, gradients, on)
     }
 
     /// Returns how far the gradients of a sheet count behind the last clip before its end, by the

@@ -18,6 +18,7 @@ mod labels;
 use super::{
     blend::{Blend, Blended},
     brick_cache::{BESIDE, Grid, SLOT, SLOT_SIDE},
+    kernel_sums::Point,
     vector::{Lanes, each, exp2_within, four, three, words},
     window::{Sample, Taps, Weights, Window, of_four, row_of},
 };
@@ -170,21 +171,21 @@ impl<'a, T: Sample> Field<'a, T> {
         Self { samples, dims, memory, shape, zero: zero as f32 }
     }
 
-    /// Returns values relative to zero, and their changes per step along each axis, at places in
-    /// steps.
+    /// Sets a point to the value relative to zero and its change per step along each axis, at
+    /// places in steps.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    pub fn at<S: Simd>(&self, simd: S, place: &[Lanes<S>; 3], point: &mut Point<S>) {
         match &self.shape {
-            Shape::Gaussian(bell) => self.gaussian(simd, bell, place),
-            Shape::Linear(factors) => self.linear(simd, factors, place),
+            Shape::Gaussian(bell) => self.gaussian(simd, bell, place, point),
+            Shape::Linear(factors) => self.linear(simd, factors, place, point),
             // A separate function, because it is large and called from three places.
             Shape::Cubic(factors) => simd.vectorize(
                 #[inline(always)]
-                || self.cubic(simd, factors, place),
+                || point.set(self.cubic(simd, factors, *place)),
             ),
             Shape::Labels(bell, shares) => simd.vectorize(
                 #[inline(always)]
-                || self.label(simd, bell, shares, place),
+                || point.set(self.label(simd, bell, shares, *place)),
             ),
         }
     }
@@ -236,39 +237,29 @@ impl Grid {
 /// Gaussians.
 impl<T: Sample> Field<'_, T> {
     #[inline(always)]
-    fn gaussian<S: Simd>(
-        &self,
-        simd: S,
-        bell: &Bell,
-        place: [Lanes<S>; 3],
-    ) -> (Lanes<S>, [Lanes<S>; 3]) {
-        let mut place = place;
-        let mut first = [Lanes::splat(simd, 0.0); 3];
-        let mut is_within = true;
-        for axis in 0..3 {
-            let last = self.dims[axis] as f32 - 1.0;
-            let low = Lanes::splat(simd, -BEYOND);
-            place[axis] = place[axis].max(low).min(Lanes::splat(simd, last + BEYOND));
-            first[axis] = place[axis].floor();
-            let within = first[axis].simd_ge(1.0) & (first[axis] + 2.0).simd_le(last);
-            is_within &= within.all_true();
-        }
+    fn gaussian<S: Simd>(&self, simd: S, bell: &Bell, place: &[Lanes<S>; 3], point: &mut Point<S>) {
+        let place: [Lanes<S>; 3] = three!(I => {
+            let last = self.dims[I] as f32 - 1.0;
+            place[I].max(Lanes::splat(simd, -BEYOND)).min(Lanes::splat(simd, last + BEYOND))
+        });
+        let first: [Lanes<S>; 3] = three!(I => place[I].floor());
+        let is_within = self.hold(first, [-1.0, 2.0]);
         let mut weights: [Weights<S>; 3] = three!(I => bell.weights(simd, place[I] - first[I]));
         let mut starts = three!(I => first[I] - 1.0);
         if !is_within {
             if self.dims.iter().any(|&count| count < 4) {
                 return simd.vectorize(
                     #[inline(always)]
-                    || self.beside(simd, bell, place, first),
+                    || point.set(self.beside(simd, bell, place, first)),
                 );
             }
-            for axis in 0..3 {
-                // Use four samples of the lattice; samples outside have no weight.
-                let end = Lanes::splat(simd, self.dims[axis] as f32 - 4.0);
-                let start = starts[axis].max(Lanes::splat(simd, 0.0)).min(end);
-                weights[axis] = moved(simd, weights[axis].weights, start - starts[axis]);
-                starts[axis] = start;
-            }
+            // Use four samples of the lattice; samples outside have no weight.
+            starts = three!(I => {
+                let end = Lanes::splat(simd, self.dims[I] as f32 - 4.0);
+                let start = starts[I].max(Lanes::splat(simd, 0.0)).min(end);
+                weights[I] = moved(simd, weights[I].weights, start - starts[I]);
+                start
+            });
         }
         let row = T::weigh(simd, &mut weights[0]);
         let window = self.window(starts);
@@ -279,7 +270,7 @@ impl<T: Sample> Field<'_, T> {
             #[inline(always)]
             |j, k| T::row(simd, &window, j, k, &row, self.zero),
         );
-        (T::ZERO.map_or(sum, |zero| sum + (zero - self.zero)), gradient)
+        point.set((T::ZERO.map_or(sum, |zero| sum + (zero - self.zero)), gradient));
     }
 
     /// Returns the windows of samples in the lattice that begin at the first sample of each lane.
@@ -441,15 +432,17 @@ impl<T: Sample> Field<'_, T> {
         &self,
         simd: S,
         factors: &Factors,
-        place: [Lanes<S>; 3],
-    ) -> (Lanes<S>, [Lanes<S>; 3]) {
-        let (mut place, mut first) = (place, three!(I => place[I].floor()));
+        place: &[Lanes<S>; 3],
+        point: &mut Point<S>,
+    ) {
+        let mut place = three!(I => place[I]);
+        let mut first = three!(I => place[I].floor());
         let mut sides = None;
         if !self.hold(first, [0.0, 1.0]) {
             if self.dims.iter().any(|&count| count < 2) {
                 return simd.vectorize(
                     #[inline(always)]
-                    || self.mirrored(simd, factors, place),
+                    || point.set(self.mirrored(simd, factors, place)),
                 );
             }
             let seen = three!(I => Seen::new(simd, place[I], self.dims[I]));
@@ -473,7 +466,7 @@ impl<T: Sample> Field<'_, T> {
         if let Some(sides) = sides {
             slopes = three!(I => slopes[I] * sides[I]);
         }
-        (z.mul_add(along_z, slices[0]), slopes)
+        point.set((z.mul_add(along_z, slices[0]), slopes));
     }
 
     /// Returns the slopes of a linear field per step along each axis ([`Tensor::slope`]), from 32
@@ -822,7 +815,9 @@ mod tests {
             places: [[f32; 8]; 3],
         ) -> [[f32; 8]; 4] {
             let places = three!(I => places[I].simd_into(simd));
-            let (value, mut slopes) = field.at(simd, places);
+            let mut point = Point::none(simd);
+            field.at(simd, &places, &mut point);
+            let Point { value, mut slopes, .. } = point;
             if matches!(field.shape, Shape::Linear(_)) {
                 slopes = field.slopes(simd, places);
             }

@@ -90,25 +90,30 @@ impl Level<'_> {
         three!(I => place[I] * scale[I] + shift[I])
     }
 
-    /// Returns the field at places in steps of the level, and its change per step along each axis.
+    /// Sets a point to the field at places in steps of the level, and its change per step along
+    /// each axis.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
+    fn at<S: Simd>(
+        &self,
+        simd: S,
+        place: [Lanes<S>; 3],
+        way: &[Lanes<S>; 3],
+        point: &mut Point<S>,
+    ) {
         // A separate function for each type of samples; otherwise each would be compiled wherever
-        // this one is called.
+        // this one is called. It writes the vectors of the point one by one. Returned, they would
+        // be copied two at a time, and each copy would wait until both were written.
         simd.vectorize(
             #[inline(always)]
-            || {
-                let (value, slopes) = match &self.field {
-                    Typed::U8(field) => field.at(simd, place),
-                    Typed::U16(field) => field.at(simd, place),
-                    Typed::I16(field) => field.at(simd, place),
-                    Typed::I32(field) => field.at(simd, place),
-                    Typed::F32(field) => field.at(simd, place),
-                    Typed::Blend(blended) => return blended.at(simd, place, way),
-                };
-                Point { value, slopes, weight: Lanes::splat(simd, 1.0) }
+            || match &self.field {
+                Typed::U8(field) => field.at(simd, &place, point),
+                Typed::U16(field) => field.at(simd, &place, point),
+                Typed::I16(field) => field.at(simd, &place, point),
+                Typed::I32(field) => field.at(simd, &place, point),
+                Typed::F32(field) => field.at(simd, &place, point),
+                Typed::Blend(blended) => *point = blended.at(simd, place, *way),
             },
-        )
+        );
     }
 
     /// Returns the slopes of a linear field at places in steps of the level.
@@ -165,6 +170,19 @@ struct OnPlane<S: Simd> {
     /// The change along the rays per world unit.
     along: Lanes<S>,
     weight: Lanes<S>,
+}
+
+impl<S: Simd> OnPlane<S> {
+    /// Copies another one vector by vector. At once, the copy would wait until all are written.
+    #[inline(always)]
+    fn set(&mut self, other: &Self) {
+        self.face.set(&other.face);
+        self.gradient[0] = other.gradient[0];
+        self.gradient[1] = other.gradient[1];
+        self.gradient[2] = other.gradient[2];
+        self.along = other.along;
+        self.weight = other.weight;
+    }
 }
 
 impl<S: Simd> Last<S> {
@@ -241,7 +259,8 @@ impl Gather<'_> {
         }
         let front = if last.plane == sheet { last.on } else { self.on_plane(simd, rays, sheet) };
         let back = self.on_plane(simd, rays, sheet + 1);
-        (last.plane, last.on) = (sheet + 1, back);
+        last.plane = sheet + 1;
+        last.on.set(&back);
         let weights = [front.weight, back.weight];
         let (thickness, none) = (stop - start, Lanes::splat(simd, 0.0));
         let sum = front.face.value + back.face.value;
@@ -270,8 +289,9 @@ impl Gather<'_> {
         if !has_gaps && !is_bent {
             return Some((layer, mask));
         }
-        let inside = self.at(simd, rays, 0.5 * (start + stop));
-        let sections = [front.gradient, self.gradient(inside.slopes), back.gradient];
+        let mut inside = Point::none(simd);
+        self.at(simd, rays, 0.5 * (start + stop), &mut inside);
+        let sections = [front.gradient, self.gradient(&inside.slopes), back.gradient];
         if self.is_blended {
             let mask = mask & layer.blend(simd, plan, bend, weights, &inside);
             layer.set_sections(simd, plan, sections, [weights[0], inside.weight, weights[1]]);
@@ -302,9 +322,10 @@ impl Gather<'_> {
         if is_bent || !self.plan.is_integrated {
             // Kinks may lie anywhere: Simpson's rule in both halves.
             let mut inside = Lanes::splat(simd, 0.0);
+            let mut point = Point::none(simd);
             for (place, weight) in [(0.25, 4.0), (0.5, 2.0), (0.75, 4.0)] {
-                let value = self.at(simd, rays, (stop - start).mul_add(place, start)).value;
-                inside = value.mul_add(Lanes::splat(simd, weight), inside);
+                self.at(simd, rays, (stop - start).mul_add(place, start), &mut point);
+                inside = point.value.mul_add(Lanes::splat(simd, weight), inside);
             }
             let sum = layer.front.value + layer.back.value;
             let mean = (sum + inside * self.plan.field.values.per_value) * (1.0 / 12.0);
@@ -332,7 +353,7 @@ impl Gather<'_> {
     #[inline(always)]
     fn far_gradient<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> [Lanes<S>; 3] {
         let level = &self.levels[0];
-        self.gradient(level.slopes(simd, level.place(rays.place(distance))))
+        self.gradient(&level.slopes(simd, level.place(rays.place(distance))))
     }
 
     /// Returns the rays on which something may be visible in a sheet.
@@ -363,8 +384,9 @@ impl Gather<'_> {
     ) -> Layer<S> {
         let none = Lanes::splat(simd, 0.0);
         let place = rays.places((begin + end) * 0.5);
-        let Point { value, slopes, .. } = self.at_place(simd, rays, place);
-        let value = value * self.plan.field.values.per_value;
+        let mut point = Point::none(simd);
+        self.at_place(simd, rays, place, &mut point);
+        let value = point.value * self.plan.field.values.per_value;
         let face = Face { value, across: [none; 3] };
         let of_sheet = [start, stop - start].map(
             #[inline(always)]
@@ -372,7 +394,7 @@ impl Gather<'_> {
         );
         let mut layer = Layer::new(simd, rays.direction, [face; 2], value, of_sheet, [begin, end]);
         if self.plan.has_gradients() {
-            layer.sections = Some([self.gradient(slopes); 3]);
+            layer.sections = Some([self.gradient(&point.slopes); 3]);
         }
         layer
     }
@@ -465,10 +487,11 @@ impl Gather<'_> {
         let least = plan.field.least_sum;
         let step = (to - from) * (1.0 / self.parts as f32);
         let (mut sum, mut all) = (none, none);
+        let mut point = Point::none(simd);
         for part in 0..self.parts {
             for place in GAUSS {
                 let place = rays.places(step.mul_add(place + part as f32, from));
-                let point = self.at_place(simd, rays, place);
+                self.at_place(simd, rays, place, &mut point);
                 let weight = if self.is_blended {
                     point.weight.simd_gt(0.0).select(point.weight + least, none)
                 } else {
@@ -576,21 +599,30 @@ impl Gather<'_> {
         shows
     }
 
-    /// Returns the field at a distance along rays, and its change per step of the lattice along
-    /// each axis.
+    /// Sets a point to the field at a distance along rays, and its change per step of the lattice
+    /// along each axis.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> Point<S> {
-        self.at_place(simd, rays, rays.place(distance))
+    fn at<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32, point: &mut Point<S>) {
+        self.at_place(simd, rays, rays.place(distance), point);
     }
 
-    /// Returns the same at places on rays, in steps of the lattice.
+    /// Does the same at places on rays, in steps of the lattice.
     #[inline(always)]
-    fn at_place<S: Simd>(&self, simd: S, rays: &Rays<S>, place: [Lanes<S>; 3]) -> Point<S> {
+    fn at_place<S: Simd>(
+        &self,
+        simd: S,
+        rays: &Rays<S>,
+        place: [Lanes<S>; 3],
+        point: &mut Point<S>,
+    ) {
+        point.weight = Lanes::splat(simd, 1.0);
         match &self.levels[..] {
-            [level] if level.grid.is_none() => level.at(simd, level.place(place), rays.way),
+            [level] if level.grid.is_none() => {
+                level.at(simd, level.place(place), &rays.way, point);
+            }
             levels => simd.vectorize(
                 #[inline(always)]
-                || self.mean(simd, levels, place, rays.way),
+                || point.set(self.mean(simd, levels, place, &rays.way)),
             ),
         }
     }
@@ -603,9 +635,10 @@ impl Gather<'_> {
         simd: S,
         levels: &[Level],
         place: [Lanes<S>; 3],
-        way: [Lanes<S>; 3],
-    ) -> Point<S> {
+        way: &[Lanes<S>; 3],
+    ) -> (Lanes<S>, [Lanes<S>; 3]) {
         let none = Lanes::splat(simd, 0.0);
+        let mut point = Point::none(simd);
         let (mut all, mut value, mut slopes, mut hidden) = (none, none, [none; 3], none);
         for level in levels {
             let Some(grid) = level.grid else { continue };
@@ -616,14 +649,14 @@ impl Gather<'_> {
                 continue;
             }
             let share = is_held.select(Lanes::splat(simd, level.share), none);
-            let Point { value: level_value, slopes: level_slopes, .. } = level.at(simd, place, way);
+            level.at(simd, place, way, &mut point);
             all += share;
-            value = share.mul_add(level_value, value);
-            slopes = three!(I => (share * level.scale[I]).mul_add(level_slopes[I], slopes[I]));
+            value = share.mul_add(point.value, value);
+            slopes = three!(I => (share * level.scale[I]).mul_add(point.slopes[I], slopes[I]));
         }
         let inverse = Lanes::splat(simd, 1.0) / all.max(Lanes::splat(simd, f32::MIN_POSITIVE));
         let value = all.simd_gt(0.0).select(value * inverse, hidden);
-        Point { value, slopes: three!(I => slopes[I] * inverse), weight: Lanes::splat(simd, 1.0) }
+        (value, three!(I => slopes[I] * inverse))
     }
 
     /// Evaluates the field on a plane.
@@ -631,8 +664,9 @@ impl Gather<'_> {
     fn on_plane<S: Simd>(&self, simd: S, rays: &Rays<S>, plane: usize) -> OnPlane<S> {
         let field = &self.plan.field;
         let distance = self.plan.planes[plane];
-        let Point { value, slopes, weight } = self.at(simd, rays, distance);
-        let gradient = self.gradient(slopes);
+        let mut point = Point::none(simd);
+        self.at(simd, rays, distance, &mut point);
+        let gradient = self.gradient(&point.slopes);
         let along = dot(gradient, rays.direction);
         let mut across = (gradient, along);
         if self.has_far_gradient && self.parts > 1 && self.plan.has_gradients() {
@@ -640,14 +674,15 @@ impl Gather<'_> {
             across = (far, dot(far, rays.direction));
         }
         let across = three!(I => across.0[I] - across.1 * rays.direction[I]);
-        let face = Face { value: value * field.values.per_value, across };
-        OnPlane { face, gradient, along: along * (1.0 / field.gradients.length), weight }
+        let face = Face { value: point.value * field.values.per_value, across };
+        let along = along * (1.0 / field.gradients.length);
+        OnPlane { face, gradient, along, weight: point.weight }
     }
 
     /// Converts the field's change per step of the lattice to a gradient in view space, in entries
     /// per thickness of a sheet.
     #[inline(always)]
-    fn gradient<S: Simd>(&self, slopes: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    fn gradient<S: Simd>(&self, slopes: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let field = &self.plan.field;
         let (axes, scale) = (field.axes, field.values.per_value * field.gradients.length);
         three!(I => {

@@ -38,6 +38,24 @@ pub struct Point<S: Simd> {
     pub weight: Lanes<S>,
 }
 
+impl<S: Simd> Point<S> {
+    /// Returns a place without a field.
+    #[inline(always)]
+    pub fn none(simd: S) -> Self {
+        let none = Lanes::splat(simd, 0.0);
+        Self { value: none, slopes: [none; 3], weight: none }
+    }
+
+    /// Sets the value and its slopes.
+    #[inline(always)]
+    pub fn set(&mut self, (value, [x, y, z]): (Lanes<S>, [Lanes<S>; 3])) {
+        self.value = value;
+        self.slopes[0] = x;
+        self.slopes[1] = y;
+        self.slopes[2] = z;
+    }
+}
+
 impl<S: Simd> Sums<S> {
     #[inline(always)]
     pub fn plus(&self, other: &Self) -> Self {

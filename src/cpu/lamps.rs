@@ -206,7 +206,7 @@ impl<S: Simd> Turned<S> {
     }
 
     /// Returns the factor on a colour, and the highlight that is added to it (Blinn 1977). `eye`
-    /// has the share of the light from the eye, and the cosine of its highlight.
+    /// has the share of the light from the eye, and the cosine of its highlight to the power.
     #[inline(always)]
     fn light(
         &self,
@@ -219,7 +219,7 @@ impl<S: Simd> Turned<S> {
         let certain = self.certainty;
         let least = Lanes::splat(simd, 1e-6);
         let shown = |cosine: Lanes<S>| one - certain * (one - cosine);
-        let highlight = vector::power(simd, eye[1].max(least), power) * certain * specular;
+        let highlight = eye[1] * certain * specular;
         let Some(lamps) = lamps else {
             return [shown(eye[0]) * diffuse + ambient, highlight];
         };
@@ -259,8 +259,9 @@ impl Plan<'_> {
         let turned = Turned::new(simd, normal, rays.direction, [0.0, 1e30], None);
         let reaching = Reaching::at(simd, self, rays, distance, &turned);
         let on = (&rays.direction, &reaching);
-        let eye = turned.lit_by_sides(simd, self.frame.surface_sides);
-        let light = (self.frame.surface_light, eye);
+        let [share, cosine] = turned.lit_by_sides(simd, self.frame.surface_sides);
+        let light = self.frame.surface_light;
+        let light = (light, [share, gloss(simd, [cosine], light.power)[0]]);
         let [share, highlight] = turned.light(simd, light, self.lamps.as_ref(), on);
         with_light(simd, color, share, highlight)
     }
@@ -309,27 +310,54 @@ impl Plan<'_> {
         gradient: ([Lanes<S>; 3], Option<Lanes<S>>),
         on: ([Lanes<S>; 3], &Reaching<S>),
     ) -> [Lanes<S>; 3] {
-        let [share, highlight] = self.light_of(simd, gradient, on);
+        let (gradient, counts) = gradient;
+        let turned = Turned::new(simd, gradient, on.0, self.certain(), counts);
+        let light = self.field.light;
+        let eye = [turned.facing, gloss(simd, [turned.facing], light.power)[0]];
+        let on = (&on.0, on.1);
+        let [share, highlight] = turned.light(simd, (light, eye), self.lamps.as_ref(), on);
         with_light(simd, color, share, highlight)
     }
 
-    /// Returns the factor on a colour of the field and the highlight that is added to it.
+    /// Returns a colour of the field in the mean of the lights at four places.
     #[inline(always)]
-    pub fn light_of<S: Simd>(
+    pub fn lit_by_four<S: Simd>(
         &self,
         simd: S,
-        (gradient, share): ([Lanes<S>; 3], Option<Lanes<S>>),
-        (direction, reaching): ([Lanes<S>; 3], &Reaching<S>),
-    ) -> [Lanes<S>; 2] {
-        let turned = Turned::new(simd, gradient, direction, self.certain(), share);
-        let light = (self.field.light, [turned.facing; 2]);
-        turned.light(simd, light, self.lamps.as_ref(), (&direction, reaching))
+        color: [Lanes<S>; 3],
+        (gradients, counts): ([[Lanes<S>; 3]; 4], Option<Lanes<S>>),
+        (direction, reaching): ([Lanes<S>; 3], [Reaching<S>; 4]),
+    ) -> [Lanes<S>; 3] {
+        let light = self.field.light;
+        let turned = four!(N => Turned::new(simd, gradients[N], direction, self.certain(), counts));
+        let glosses = gloss(simd, four!(N => turned[N].facing), light.power);
+        let lights = four!(N => {
+            let eye = (light, [turned[N].facing, glosses[N]]);
+            turned[N].light(simd, eye, self.lamps.as_ref(), (&direction, &reaching[N]))
+        });
+        let [share, highlight] = each!([0, 1], I => {
+            ((lights[0][I] + lights[1][I]) + (lights[2][I] + lights[3][I])) * 0.25
+        });
+        with_light(simd, color, share, highlight)
     }
+}
+
+/// Returns the cosines of highlights to the light's power.
+#[inline(always)]
+fn gloss<S: Simd, const N: usize>(
+    simd: S,
+    mut cosines: [Lanes<S>; N],
+    power: f32,
+) -> [Lanes<S>; N] {
+    for cosine in &mut cosines {
+        *cosine = cosine.max(Lanes::splat(simd, 1e-6));
+    }
+    vector::powers(simd, cosines, power)
 }
 
 /// Returns a colour times a share of light, and a highlight.
 #[inline(always)]
-pub fn with_light<S: Simd>(
+fn with_light<S: Simd>(
     simd: S,
     color: [Lanes<S>; 3],
     share: Lanes<S>,

@@ -1,6 +1,6 @@
 //! The field of a sheet at eight pixels: a parabola along each ray.
 
-use super::vector::Lanes;
+use super::vector::{Lanes, each, three};
 use fearless_simd::{Simd, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
@@ -18,6 +18,17 @@ const EVEN: f32 = 128.0;
 pub struct Face<S: Simd> {
     pub value: Lanes<S>,
     pub across: [Lanes<S>; 3],
+}
+
+impl<S: Simd> Face<S> {
+    /// Copies another one vector by vector. At once, the copy would wait until all are written.
+    #[inline(always)]
+    pub fn set(&mut self, other: &Self) {
+        self.value = other.value;
+        self.across[0] = other.across[0];
+        self.across[1] = other.across[1];
+        self.across[2] = other.across[2];
+    }
 }
 
 /// The field of a sheet at eight pixels.
@@ -52,11 +63,16 @@ impl<S: Simd> Layer<S> {
     pub fn new(
         simd: S,
         direction: [Lanes<S>; 3],
-        [front, back]: [Face<S>; 2],
+        faces: [Face<S>; 2],
         middle: Lanes<S>,
         [start, thickness]: [Lanes<S>; 2],
         [begin, end]: [Lanes<S>; 2],
     ) -> Self {
+        let [front, back] = each!([0, 1], N => {
+            let Face { value, across } = &faces[N];
+            // Vector by vector: a copy would wait until all are written.
+            Face { value: *value, across: three!(I => across[I]) }
+        });
         Self {
             front,
             back,
