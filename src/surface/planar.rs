@@ -64,14 +64,22 @@ pub(super) fn off_surface(
     work: &'static str,
 ) -> Result<Vec<bool>> {
     let all = points.len();
+    let none = || vec![false; all];
+    if all < FEWEST {
+        return Ok(none());
+    }
     let mut on = vote(nearest, is_flat, MORE_THAN_HALF);
     on.par_iter_mut().enumerate().for_each(|(at, on)| *on |= is_known(at));
-    if all < FEWEST {
-        return Ok(vec![false; all]);
-    }
+    // Later answers only add points.
+    let is_surface = |on: &[bool]| {
+        let count = on.par_iter().filter(|on| **on).count() as f64;
+        count / (all as f64) >= LEAST_SURFACE
+    };
     for stride in STRIDES {
-        let is_whole = stride > 1 && MORE * stride * MOST_OF_CLOUD > all;
-        if is_whole || on.par_iter().all(|on| *on) {
+        if is_surface(&on) {
+            return Ok(none());
+        }
+        if stride > 1 && MORE * stride * MOST_OF_CLOUD > all {
             break;
         }
         let flat = flat_of_more(points, &on, stride, deadline, work)?;
@@ -82,10 +90,9 @@ pub(super) fn off_surface(
         let joined = vote(nearest, &on, HALF);
         on.par_iter_mut().zip(joined).for_each(|(on, joined)| *on |= joined);
     }
-    let count = on.par_iter().filter(|on| **on).count() as f64;
-    Ok(match count / (all as f64) < LEAST_SURFACE {
-        true => (0..all).into_par_iter().map(|at| !is_known(at)).collect(),
-        false => vec![false; all],
+    Ok(match is_surface(&on) {
+        true => none(),
+        false => (0..all).into_par_iter().map(|at| !is_known(at)).collect(),
     })
 }
 
