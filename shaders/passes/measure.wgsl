@@ -30,7 +30,7 @@ fn measure(@builtin(global_invocation_id) id: vec3<u32>) {
     var need = vec2(0u);
     for (var i = start; i < min(start + RUN, count); i++) {
         let splat = candidate(i);
-        let span = locate(splat.center, splat.covariance, splat.extent);
+        let span = locate(splat);
         var packed = NO_SPAN;
         if span.visible {
             packed = pack_span(span);

@@ -38,7 +38,7 @@ fn write_general(at: u32, splat: Candidate) {
     let i21 = -l21 * i11 * i22;
     let i20 = -(l20 * i00 + l21 * i10) * i22;
     // The sign of the squared extent tells march which payload it is.
-    let extent2 = splat.extent * splat.extent * select(-1.0, 1.0, (source.flags & RADIANCE) != 0u);
+    let extent2 = splat.rim * splat.rim * select(-1.0, 1.0, (source.flags & RADIANCE) != 0u);
     records[at] = vec4(splat.center, splat.strength);
     records[at + 1u] = vec4(i00, i10, i20, i11);
     let is_trained = TRAINED && (source.flags & TRAINED_FLAG) != 0u;
@@ -99,7 +99,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
         } else {
             write_general(at, splat);
         }
-        var box = box_of(locate(splat.center, splat.covariance, splat.extent));
+        var box = box_of(locate(splat));
         box.first_tile |= select(0u, BOX_ISOTROPIC, words == 1u);
         if TWO_LEVELS {
             let is_coarse = words == 1u && (source.flags & COARSE) != 0u;

@@ -16,6 +16,9 @@ struct Candidate {
     center: vec3<f32>,
     covariance: Symmetric,
     extent: f32,
+    // The radius beyond which it covers nothing of a pixel. A faint trained Gaussian ends before
+    // its extent.
+    rim: f32,
     // Value (scalar), or optical depth at the centre (radiance).
     strength: f32,
     color: u32,
@@ -103,10 +106,16 @@ fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> vec2<f32> {
 // with its sheets, does not need this.
 const SECTION_OVERREACH: f32 = 1.25;
 
-fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
+fn locate(splat: Candidate) -> Span {
     var span: Span;
     span.visible = false;
-    let e2 = extent * extent;
+    if splat.rim <= 0.0 {
+        return span;
+    }
+    let c = splat.center;
+    let covariance = splat.covariance;
+    let extent = splat.extent;
+    let rim = splat.rim;
     let reach_z = extent * sqrt(covariance.zz);
     var distance = c.z;
     var reach = reach_z;
@@ -120,9 +129,11 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
         distance = length(c);
         let toward = c / max(distance, 1e-30);
         reach = extent * sqrt(quadratic_form(covariance, toward));
-        let across = e2 * (covariance.xx + covariance.yy + covariance.zz);
+        let across = extent * extent * (covariance.xx + covariance.yy + covariance.zz);
         far = sqrt((distance + reach) * (distance + reach) + across);
-        if c.z - reach_z > frame.z_near {
+        let rim_z = rim * sqrt(covariance.zz);
+        let e2 = rim * rim;
+        if c.z - rim_z > frame.z_near {
             bounds_x = tangent_bounds(
                 c.x,
                 c.z,
@@ -138,12 +149,12 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
                 e2 * covariance.zz,
             );
         } else {
-            bounds_x = box_bounds(c.x, extent * sqrt(covariance.xx), frame.z_near, c.z + reach_z);
-            bounds_y = box_bounds(c.y, extent * sqrt(covariance.yy), frame.z_near, c.z + reach_z);
+            bounds_x = box_bounds(c.x, rim * sqrt(covariance.xx), frame.z_near, c.z + rim_z);
+            bounds_y = box_bounds(c.y, rim * sqrt(covariance.yy), frame.z_near, c.z + rim_z);
         }
     } else {
-        let reach_x = extent * sqrt(covariance.xx);
-        let reach_y = extent * sqrt(covariance.yy);
+        let reach_x = rim * sqrt(covariance.xx);
+        let reach_y = rim * sqrt(covariance.yy);
         bounds_x = vec2(c.x - reach_x, c.x + reach_x);
         bounds_y = vec2(c.y - reach_y, c.y + reach_y);
     }

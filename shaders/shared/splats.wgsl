@@ -7,6 +7,8 @@ const FOOTPRINT_BLUR: f32 = 0.35;
 // share of it along the axis.
 const TRAINED_BLUR: f32 = 0.54772256;
 const TRAINED_BLUR_ALONG: f32 = 0.1;
+// The least share of a pixel that a trained Gaussian covers, 1/255, less what rounding may take.
+const LEAST_TRAINED: f32 = 0.00391765;
 // Opaque surfaces must not grow through the blur: see splat.rs.
 const STEP_BACK: f32 = 2.4;
 
@@ -73,6 +75,12 @@ fn splat_at(index: u32) -> Candidate {
     splat.covariance.yz = c0.y * c0.z + c1.y * c1.z + c2.y * c2.z;
     splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + along * along;
     splat.extent = source.extent;
+    splat.rim = source.extent;
+    if is_trained && packed.strength < 0.0 {
+        // Where its opacity falls to the least share. A merged node has an optical depth.
+        let rim2 = 2.0 * log(max(-packed.strength / LEAST_TRAINED, 1.0));
+        splat.rim = min(sqrt(rim2), source.extent);
+    }
     splat.strength = packed.strength;
     splat.color = packed.color;
     splat.normal = packed.normal;

@@ -22,6 +22,7 @@ fn candidate(order: u32) -> Candidate {
     splat.center = source.origin.xyz + steps.x * source.axis_x.xyz + steps.y * source.axis_y.xyz
         + steps.z * source.axis_z.xyz;
     splat.extent = source.extent;
+    splat.rim = source.extent;
     splat.strength = sample_value(number, source.lattice.w);
     splat.color = 0u;
     splat.normal = NO_NORMAL;

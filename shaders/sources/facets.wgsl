@@ -53,6 +53,7 @@ fn around_rod(index: u32) -> Candidate {
     var splat: Candidate;
     splat.center = 0.5 * (a + b);
     splat.extent = 1.0;
+    splat.rim = 1.0;
     splat.normal = NO_NORMAL;
     let f = 0.5 * (b - a);
     let half = length(f);
@@ -86,6 +87,7 @@ fn candidate(index: u32) -> Candidate {
     var splat: Candidate;
     splat.center = (a + b + c) / 3.0;
     splat.extent = 1.0;
+    splat.rim = 1.0;
     let f = a - splat.center;
     let g = (b - c) * 0.57735027;
     var pixel = 1.0 / frame.scale;

@@ -106,6 +106,7 @@ fn candidate(order: u32) -> Candidate {
     splat.center = source.origin.xyz + steps.x * source.axis_x.xyz + steps.y * source.axis_y.xyz
         + steps.z * source.axis_z.xyz;
     splat.extent = source.extent;
+    splat.rim = source.extent;
     splat.strength = value;
     splat.color = 0u;
     splat.normal = NO_NORMAL;

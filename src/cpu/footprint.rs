@@ -5,7 +5,7 @@ use super::plan::Plan;
 use crate::{
     plan::{source::Source, tables::Values},
     scene::{Mode, Order},
-    splat::{STEP_BACK, Splat, decode_normal, decode_trained_color},
+    splat::{STEP_BACK, Splat, TRAINED_OPACITIES, decode_normal, decode_trained_color},
 };
 use glam::{Mat3, Vec3};
 
@@ -13,6 +13,8 @@ use glam::{Mat3, Vec3};
 pub const SECTION_OVERREACH: f32 = 1.25;
 /// Shorter gradients have no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
+/// The least share of a pixel that a trained Gaussian covers, less what rounding may take from it.
+pub const LEAST_TRAINED: f32 = TRAINED_OPACITIES[0] as f32 * 0.999;
 
 /// The payload of a splat.
 #[derive(Debug, Clone, Copy)]
@@ -30,8 +32,17 @@ pub struct Candidate {
     pub center: Vec3,
     pub covariance: Mat3,
     pub extent: f32,
+    /// The radius beyond which it covers nothing of a pixel. A faint trained Gaussian ends before
+    /// its extent.
+    pub rim: f32,
     pub strength: f32,
     pub carried: Carried,
+}
+
+/// Returns the square of the radius, in standard deviations, beyond which a trained Gaussian of an
+/// opacity covers too little of a pixel to be drawn. It is below 0 if it does so everywhere.
+fn trained_rim2(opacity: f32) -> f32 {
+    2.0 * (opacity / LEAST_TRAINED).ln()
 }
 
 /// The meaning of a record's strength and payload.
@@ -70,6 +81,21 @@ pub struct Record {
     pub sheets: [u16; 2],
     /// The number of the sample's field.
     pub field: u8,
+}
+
+impl Record {
+    /// A splat that covers nothing.
+    pub const NONE: Self = Self {
+        center: [0.0; 3],
+        strength: 0.0,
+        whitening: [0.0; 6],
+        extent2: 0.0,
+        kind: Kind::Radiance,
+        payload: [0.0; 8],
+        pixels: [[0; 2], [-1; 2]],
+        sheets: [0; 2],
+        field: 0,
+    };
 }
 
 /// The pixels and sheets of a footprint.
@@ -129,7 +155,11 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         strength = counted(plan, strength);
         Carried::Scalar { weight: weight * before / after, gradient }
     };
-    Candidate { center, covariance, extent: source.extent, strength, carried }
+    let extent = source.extent;
+    // A merged node of trained Gaussians has an optical depth.
+    let has_opacity = source.is_trained && strength < 0.0;
+    let rim = if has_opacity { trained_rim2(-strength).max(0.0).sqrt() } else { extent };
+    Candidate { center, covariance, extent, rim: rim.min(extent), strength, carried }
 }
 
 /// Returns the area of a splat with these axes, seen along a direction, over its area once it is
@@ -153,6 +183,9 @@ pub fn counted(plan: &Plan, value: f32) -> f32 {
 
 /// Returns the record of a splat, or `None` if the splat meets no pixel or no sheet.
 pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record> {
+    if splat.rim <= 0.0 {
+        return None;
+    }
     let Place { pixels, sheets } = locate(plan, splat, source.ends)?;
     let s = &splat.covariance;
     // The minimum keeps discs much thinner than wide invertible in 32 bits.
@@ -196,7 +229,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
         center: splat.center.to_array(),
         strength,
         whitening: [m00, m10, m20, m11, m21, m22],
-        extent2: splat.extent * splat.extent,
+        extent2: splat.rim * splat.rim,
         kind,
         payload,
         pixels,
@@ -248,7 +281,8 @@ pub fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> [f32; 2] {
 
 fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
     let (c, s, extent) = (splat.center, &splat.covariance, splat.extent);
-    let reaches = extent * Vec3::new(s.x_axis.x.sqrt(), s.y_axis.y.sqrt(), s.z_axis.z.sqrt());
+    let deviations = Vec3::new(s.x_axis.x.sqrt(), s.y_axis.y.sqrt(), s.z_axis.z.sqrt());
+    let reaches = extent * deviations;
     let (mut distance, mut reach, mut far) = (c.z, reaches.z, c.z + reaches.z);
     if plan.view.perspective {
         if c.z + reaches.z <= plan.frame.z_near {
@@ -270,7 +304,7 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
     if !plan.is_whole() && !meets {
         return None;
     }
-    let pixels = pixels(plan, bounds(plan, splat, reaches))?;
+    let pixels = pixels(plan, bounds(plan, splat, splat.rim * deviations))?;
     if plan.is_whole() {
         return whole_sheet(plan, c, distance).map(|sheet| Place { pixels, sheets: [sheet; 2] });
     }
@@ -284,7 +318,7 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
 /// Bounds a splat in the image plane, at distance 1 in perspective. `reaches` are half the sides of
 /// the box around it in view space.
 fn bounds(plan: &Plan, splat: &Candidate, reaches: Vec3) -> [[f32; 2]; 2] {
-    let (c, s, e2) = (splat.center, &splat.covariance, splat.extent * splat.extent);
+    let (c, s, e2) = (splat.center, &splat.covariance, splat.rim * splat.rim);
     if !plan.view.perspective {
         return [[c.x - reaches.x, c.x + reaches.x], [c.y - reaches.y, c.y + reaches.y]];
     }
@@ -323,7 +357,7 @@ fn pixels(plan: &Plan, bounds: [[f32; 2]; 2]) -> Option<[[i32; 2]; 2]> {
 
 /// Returns the sheet of a splat that is drawn whole: that of its centre, or `None` if no sheet
 /// contains the centre.
-fn whole_sheet(plan: &Plan, center: Vec3, distance: f32) -> Option<usize> {
+pub fn whole_sheet(plan: &Plan, center: Vec3, distance: f32) -> Option<usize> {
     let mut place = distance;
     if plan.mode == Mode::AxisSheets {
         place = plan.frame.sheet_normal.dot(center);
@@ -337,4 +371,20 @@ fn whole_sheet(plan: &Plan, center: Vec3, distance: f32) -> Option<usize> {
         sheet = plan.sheets + 1 - sheet;
     }
     is_within.then_some(sheet)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_faint_gaussian_ends_where_it_covers_too_little() {
+        for opacity in [0.005, 0.02, 0.1, 0.5, 1.0] {
+            let rim2 = trained_rim2(opacity);
+            let covered = opacity * (-0.5 * rim2).exp();
+            let least = TRAINED_OPACITIES[0] as f32;
+            assert!(covered < least && covered > 0.99 * least, "{opacity}: {covered}");
+        }
+        assert!(trained_rim2(0.0039) < 0.0);
+    }
 }

@@ -328,6 +328,7 @@ impl<'a> LatticeSource<'a> {
             center: self.source.origin + self.source.to_view * steps,
             covariance,
             extent: self.source.extent,
+            rim: self.source.extent,
             strength: value,
             carried: Carried::Scalar { weight: 1.0, gradient },
         };
@@ -419,6 +420,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
                         center: origin + to_view * steps,
                         covariance,
                         extent: source.extent,
+                        rim: source.extent,
                         strength: sample(
                             plan,
                             cache.samples(),

@@ -23,6 +23,7 @@ use crate::{
     scene::{Mode, Optics, Order},
 };
 use fearless_simd::{Level, Simd, mask32x8, prelude::*};
+use std::ops::Range;
 
 /// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the
 /// largest value.
@@ -67,9 +68,48 @@ struct Seen<'a, S: Simd> {
 /// The windows of a tile's splats that are still to be added.
 struct Ahead<'a> {
     /// The splats whose first window has not begun, sorted by first sheet.
-    entries: &'a [Entry],
+    near: Near<'a>,
     /// The splats whose next window begins at each of the sheets ahead.
     continued: [Vec<u32>; WINDOW],
+}
+
+/// The splats of a tile that are next. Their records lie anywhere in memory, so a few are copied
+/// from there together, and wait for it together.
+struct Near<'a> {
+    records: &'a [Vec<Record>],
+    entries: &'a [Entry],
+    copied: [Record; NEAR],
+    /// Of the copied records, those that are still to come.
+    left: Range<usize>,
+}
+
+/// Records copied together.
+const NEAR: usize = 8;
+
+impl<'a> Near<'a> {
+    fn new(records: &'a [Vec<Record>], entries: &'a [Entry]) -> Self {
+        Self { records, entries, copied: [Record::NONE; NEAR], left: 0..0 }
+    }
+
+    /// Returns the first sheet of the next splat.
+    fn sheet(&self) -> Option<usize> {
+        self.entries.first().map(|entry| usize::from(entry.sheet))
+    }
+
+    /// Returns the next splat.
+    #[inline(always)]
+    fn next(&mut self) -> Option<(Entry, &Record)> {
+        let (entry, later) = self.entries.split_first()?;
+        if self.left.is_empty() {
+            for (copy, entry) in self.copied.iter_mut().zip(self.entries) {
+                *copy = *record_of(self.records, entry.record);
+            }
+            self.left = 0..NEAR;
+        }
+        self.entries = later;
+        let place = self.left.next()?;
+        Some((*entry, &self.copied[place]))
+    }
 }
 
 impl DrawnField<'_> {
@@ -209,11 +249,10 @@ impl March<'_> {
         Packet { number, rays, others, pixels, is_done: false }
     }
 
-    /// Returns a record and the plan of its field.
+    /// Returns the plan of a record's field.
     #[inline(always)]
-    fn planned(&self, number: u32) -> (&Record, &Plan<'_>) {
-        let record = record_of(self.records, number);
-        (record, &self.plans[usize::from(record.field)])
+    fn plan_of(&self, record: &Record) -> &Plan<'_> {
+        &self.plans[usize::from(record.field)]
     }
 
     /// Adds the splats one by one.
@@ -226,18 +265,14 @@ impl March<'_> {
         tile: &mut OpenTile<'_, S>,
         drawn: &mut u64,
     ) {
-        for entry in entries {
+        let mut near = Near::new(self.records, entries);
+        while let Some((entry, record)) = near.next() {
             let window = Window { front: usize::from(entry.sheet), is_continued: false };
-            let (record, plan) = self.planned(entry.record);
-            tile.add(simd, plan, record, window);
+            tile.add(simd, self.plan_of(record), record, window);
             *drawn += 1;
-            if order == Order::FrontToBack {
-                for packet in &mut tile.packets {
-                    packet.is_done = !packet.pixels.through.simd_ge(OPAQUE).any_true();
-                }
-                if tile.packets.iter().all(|packet| packet.is_done) {
-                    return;
-                }
+            let is_done = |packet: &Packet<S>| packet.is_done;
+            if order == Order::FrontToBack && tile.packets.iter().all(is_done) {
+                return;
             }
         }
     }
@@ -252,14 +287,14 @@ impl March<'_> {
         drawn: &mut u64,
     ) {
         let plan = &self.plans[0];
-        let mut ahead = Ahead { entries, continued: std::array::from_fn(|_| Vec::new()) };
+        let near = Near::new(self.records, entries);
+        let mut ahead = Ahead { near, continued: std::array::from_fn(|_| Vec::new()) };
         let mut sheet = 0;
         // Number of sheets with sums, from `sheet` on.
         let mut open = 0;
         while sheet <= plan.sheets {
             if open == 0 {
-                let entry = ahead.entries.first();
-                let mut next = entry.map_or(usize::MAX, |entry| usize::from(entry.sheet));
+                let mut next = ahead.near.sheet().unwrap_or(usize::MAX);
                 for (open_field, seen) in tile.fields.iter().zip(seen.iter()) {
                     next = next.min(next_mark(seen.marks, sheet));
                     next =
@@ -316,19 +351,22 @@ impl March<'_> {
         tile: &mut OpenTile<'_, S>,
     ) -> u64 {
         let mut continued = std::mem::take(&mut ahead.continued[sheet % WINDOW]);
-        let begins = |entry: &&Entry| usize::from(entry.sheet) <= sheet;
-        let count = ahead.entries.iter().take_while(begins).count();
-        let (begun, later) = ahead.entries.split_at(count);
-        ahead.entries = later;
-        let begun = begun.iter().map(|entry| (entry.record, false));
         let mut added = 0;
-        for (number, is_continued) in continued.iter().map(|number| (*number, true)).chain(begun) {
-            let (record, plan) = self.planned(number);
+        let later = &mut ahead.continued[(sheet + WINDOW - 1) % WINDOW];
+        let mut add = |number: u32, record: &Record, is_continued: bool| {
+            let plan = self.plan_of(record);
             tile.add(simd, plan, record, Window { front: sheet, is_continued });
             added += 1;
             if usize::from(record.sheets[1]) >= sheet + WINDOW && !plan.is_whole() {
-                ahead.continued[(sheet + WINDOW - 1) % WINDOW].push(number);
+                later.push(number);
             }
+        };
+        for &number in &continued {
+            add(number, record_of(self.records, number), true);
+        }
+        while ahead.near.sheet().is_some_and(|first| first <= sheet) {
+            let Some((entry, record)) = ahead.near.next() else { break };
+            add(entry.record, record, false);
         }
         // This sheet's slot is next used by the sheet four further on, which reuses the memory.
         continued.clear();

@@ -79,6 +79,8 @@ pub struct Plan<'a> {
     pub isosurfaces: usize,
     /// The scene has splats of radiance.
     pub has_radiance: bool,
+    /// Some of them may have normals. Trained Gaussians have none.
+    pub has_normals: bool,
     /// The scene has facets.
     pub has_facets: bool,
     /// Some facets are rods.
@@ -142,6 +144,7 @@ impl<'a> Plan<'a> {
             is_integrated: settings.classification == Classification::PreIntegrated,
             isosurfaces: 0,
             has_radiance: false,
+            has_normals: false,
             has_facets: false,
             has_rods: false,
             with_images: Vec::new(),
@@ -167,7 +170,8 @@ impl<'a> Plan<'a> {
                 }
                 Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
                     plan.has_radiance = true;
-                    plan.lit_surfaces |= is_lit;
+                    plan.has_normals |= !item.is_trained();
+                    plan.lit_surfaces |= is_lit && !item.is_trained();
                 }
                 Item::Scalar(..) | Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
             }
@@ -218,6 +222,7 @@ impl<'a> Plan<'a> {
             self.is_classified = true;
             self.has_slopes = false;
             self.lit_surfaces |= is_shaded;
+            self.has_normals |= is_shaded;
             return;
         }
         self.has_field = true;

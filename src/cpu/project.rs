@@ -2,7 +2,7 @@
 //! at a time.
 
 use super::{
-    footprint::{Kind, Record, SECTION_OVERREACH, record, widened},
+    footprint::{Kind, LEAST_TRAINED, Record, SECTION_OVERREACH, whole_sheet},
     plan::Plan,
     vector::{Lanes, dot, each, log2, three},
 };
@@ -11,6 +11,7 @@ use crate::{
     splat::{NO_NORMAL, STEP_BACK, Splat, TRAINED_COLOR},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
+use glam::Vec3;
 
 /// Splats of radiance that share an origin.
 pub struct Projector<'a> {
@@ -39,12 +40,15 @@ struct Widened<S: Simd> {
     has_normal: mask32x8<S>,
     /// The factor on the optical depth.
     thinned: Lanes<S>,
+    /// The radii beyond which they cover nothing of a pixel ([`Candidate::rim`]).
+    rim: Lanes<S>,
 }
 
 /// The places of footprints: the first and the last pixel, the range of distances, and which
 /// footprints meet the picture.
 struct Places<S: Simd> {
     pixels: [[Lanes<S>; 2]; 2],
+    distance: Lanes<S>,
     near: Lanes<S>,
     far: Lanes<S>,
     meets: mask32x8<S>,
@@ -71,17 +75,6 @@ impl<'a> Projector<'a> {
         splats: impl ExactSizeIterator<Item = (&'s Splat, f32)>,
         records: &mut Vec<Record>,
     ) {
-        if self.plan.is_whole() {
-            for (splat, share) in splats {
-                let splat = Splat { strength: splat.strength * share, ..*splat };
-                records.extend(record(
-                    self.plan,
-                    &self.source,
-                    &widened(self.plan, &self.source, &splat),
-                ));
-            }
-            return;
-        }
         let mut eight = Eight {
             center: [[0.0; 8]; 3],
             factor: [[1.0; 8]; 6],
@@ -115,12 +108,13 @@ impl<'a> Projector<'a> {
     #[inline(always)]
     fn add_eight<S: Simd>(&self, simd: S, eight: &Eight, mask: u64, records: &mut Vec<Record>) {
         let splats = self.widened(simd, eight);
-        let Places { pixels, near, far, meets } = self.locate(simd, &splats);
+        let Places { pixels, distance, near, far, meets } = self.locate(simd, &splats);
         let mut bits = meets.to_bitmask() & mask;
         if bits == 0 {
             return;
         }
         let whitening = whitening(simd, &splats.covariance);
+        let extent2: [f32; 8] = (splats.rim * splats.rim).into();
         let [strength, payload @ ..] = self.payload(simd, eight, &splats);
         let strength: [f32; 8] = strength.into();
         let payload: [[f32; 8]; 7] = each!([0, 1, 2, 3, 4, 5, 6], I => payload[I].into());
@@ -132,6 +126,18 @@ impl<'a> Projector<'a> {
                 let first = self.plan.sheet_before(sheets[0][lane].into(), depth);
                 let last = (first + 1).min(self.plan.sheets);
                 (sheets[0][lane], sheets[1][lane]) = (first as u16, last as u16);
+            }
+        }
+        if self.plan.is_whole() {
+            let distance: [f32; 8] = distance.into();
+            for lane in 0..8 {
+                let center = Vec3::from_array(three!(I => center[I][lane]));
+                match whole_sheet(self.plan, center, distance[lane]) {
+                    Some(sheet) => {
+                        (sheets[0][lane], sheets[1][lane]) = (sheet as u16, sheet as u16)
+                    }
+                    None => bits &= !(1 << lane),
+                }
             }
         }
         let [[left, top], [right, bottom]]: [[[i32; 8]; 2]; 2] =
@@ -146,7 +152,7 @@ impl<'a> Projector<'a> {
                 center: three!(I => center[I][lane]),
                 strength: strength[lane],
                 whitening: each!([0, 1, 2, 3, 4, 5], I => whitening[I][lane]),
-                extent2: self.source.extent * self.source.extent,
+                extent2: extent2[lane],
                 kind: Kind::Radiance,
                 payload: [1.0, facing, red, green, blue, nx, ny, nz],
                 pixels: [[left[lane], top[lane]], [right[lane], bottom[lane]]],
@@ -203,7 +209,17 @@ impl<'a> Projector<'a> {
         let variance = dot(along, along);
         let back = ((variance + blur2).sqrt() - variance.sqrt()) * STEP_BACK as f32;
         let center = three!(I => center[I] - normal[I] * back);
-        Widened { center, covariance, normal, has_normal, thinned }
+        let extent = Lanes::splat(simd, self.source.extent);
+        let mut rim = extent;
+        if self.is_trained() {
+            let strength: Lanes<S> = eight.strength.simd_into(simd);
+            let opacity = strength.abs().max(Lanes::splat(simd, LEAST_TRAINED));
+            let rim2 = log2(simd, opacity * (1.0 / LEAST_TRAINED)) * (2.0 * std::f32::consts::LN_2);
+            // A merged node has an optical depth.
+            let has_opacity = strength.simd_lt(0.0);
+            rim = has_opacity.select(rim2.max(none).sqrt().min(extent), extent);
+        }
+        Widened { center, covariance, normal, has_normal, thinned, rim }
     }
 
     /// Returns the areas of translucent splats, seen from the eye, over those of the widened ones
@@ -263,6 +279,7 @@ impl<'a> Projector<'a> {
         }
         let facing = (away * -4.0 + 0.5).max(Lanes::splat(simd, 1.0 / 255.0)).min(one);
         let facing = has_normal.select(facing, one);
+        let facing = if self.plan.single().is_some() { one } else { facing };
         let packed: i32x8<S> = eight.color.simd_into(simd);
         let [red, green, blue, opacity] = each!([0, 8, 16, 24], SHIFT =>
             Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
@@ -290,7 +307,8 @@ impl<'a> Projector<'a> {
         let (plan, extent) = (self.plan, self.source.extent);
         let c = splats.center;
         let [xx, xy, xz, yy, yz, zz] = splats.covariance;
-        let reaches = [xx.sqrt() * extent, yy.sqrt() * extent, zz.sqrt() * extent];
+        let deviations = [xx.sqrt(), yy.sqrt(), zz.sqrt()];
+        let reaches = three!(I => deviations[I] * extent);
         let (mut distance, mut reach, mut far) = (c[2], reaches[2], c[2] + reaches[2]);
         let mut meets = mask32x8::splat(simd, true);
         let mut is_beside = mask32x8::splat(simd, false);
@@ -315,14 +333,18 @@ impl<'a> Projector<'a> {
         // cut along a ray.
         far = (far - distance) * SECTION_OVERREACH + distance;
         let near = distance - reach * SECTION_OVERREACH;
-        meets &= far.simd_gt(plan.planes[1]) & near.simd_lt(plan.planes[plan.sheets + 1]);
+        if !plan.is_whole() {
+            meets &= far.simd_gt(plan.planes[1]) & near.simd_lt(plan.planes[plan.sheets + 1]);
+        }
         let mut near = is_beside.select(Lanes::splat(simd, -1e38), near);
         if plan.by_centers {
             (near, far) = (c[2], c[2]);
             meets &= near.simd_ge(plan.planes[1]) & far.simd_lt(plan.planes[plan.sheets + 1]);
         }
-        let (pixels, has_pixels) = self.pixels(simd, self.bounds(simd, splats, reaches));
-        Places { pixels, near, far, meets: meets & has_pixels }
+        let across = three!(I => deviations[I] * splats.rim);
+        let (pixels, has_pixels) = self.pixels(simd, self.bounds(simd, splats, across));
+        let covers = splats.rim.simd_gt(0.0);
+        Places { pixels, distance, near, far, meets: meets & has_pixels & covers }
     }
 
     /// Bounds splats in the image plane, at distance 1 in perspective. `reaches` are half the sides
@@ -340,7 +362,7 @@ impl<'a> Projector<'a> {
             return bounds;
         }
         let [xx, _, xz, yy, yz, zz] = splats.covariance;
-        let e2 = self.source.extent * self.source.extent;
+        let e2 = splats.rim * splats.rim;
         let is_front = (c[2] - reaches[2]).simd_gt(self.plan.frame.z_near);
         let (xz, yz, zz) = (xz * e2, yz * e2, zz * e2);
         let tangents = [

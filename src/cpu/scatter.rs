@@ -4,19 +4,19 @@
 
 use super::{
     cells::CellTile,
-    close::Packet,
+    close::{OPAQUE, Packet},
     footprint::{Kind, Record},
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     sums::{ScalarSums, Sums, WINDOW},
-    vector::{Lanes, apart, dot, each, exp, log2, three},
+    vector::{Lanes, apart, dot, each, exp, three},
 };
 use crate::{
     plan::{TILE, field::FieldKernel},
     scene::{Optics, Order},
     splat::TRAINED_OPACITIES,
 };
-use fearless_simd::{Simd, mask32x8, prelude::*};
+use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
 /// The integral of exp(−x²/2).
 const SQRT_TAU: f32 = 2.506_628_3;
@@ -66,11 +66,12 @@ struct Along<S: Simd> {
     rho2: Lanes<S>,
     inside: mask32x8<S>,
     /// The planes, in whitened lengths from the closest approach; v = M·c × β, β = M·b, the inverse
-    /// of |β|, and L = β·M·(c − a) (docs/engine.md).
+    /// of |β| and its square, and L = β·M·(c − a) (docs/engine.md).
     t: [Lanes<S>; 3],
     v: [Lanes<S>; 3],
     beta: [Lanes<S>; 3],
     inverse: Lanes<S>,
+    inverse2: Lanes<S>,
     l: Lanes<S>,
 }
 
@@ -163,20 +164,24 @@ impl<'a> Projected<'a> {
             beta = [none, none, Lanes::splat(simd, m2[2])];
             l = (self.whitened[2] - dx * m0[2] - dy * m1[2]) * m2[2];
         }
-        let size2 = dot(beta, beta);
-        let inverse = Lanes::splat(simd, 1.0) / size2.max(Lanes::splat(simd, 1e-37)).sqrt();
-        let rho2 = dot(v, v) * inverse * inverse;
+        let size2 = dot(beta, beta).max(Lanes::splat(simd, 1e-37));
+        let inverse2 = Lanes::splat(simd, 1.0) / size2;
+        let rho2 = dot(v, v) * inverse2;
         let inside = rho2.simd_le(self.record.extent2);
         if !inside.any_true() {
             return None;
         }
         let far = Lanes::splat(simd, FAR);
-        let mut t = [far; 3];
-        let planes = &plan.planes[self.window.front + 1..];
-        for (t, plane) in t.iter_mut().zip(planes).take(self.count) {
-            *t = ((size2 * (rays.cosine * *plane) - l) * inverse).max(-far).min(far);
+        let (mut t, mut inverse) = ([far; 3], inverse2);
+        // A splat by its centre has nothing to do with planes.
+        if self.behind.is_none() {
+            inverse = inverse2.sqrt();
+            let planes = &plan.planes[self.window.front + 1..];
+            for (t, plane) in t.iter_mut().zip(planes).take(self.count) {
+                *t = ((size2 * (rays.cosine * *plane) - l) * inverse).max(-far).min(far);
+            }
         }
-        Some(Along { rho2, inside, t, v, beta, inverse, l })
+        Some(Along { rho2, inside, t, v, beta, inverse, inverse2, l })
     }
 
     /// Returns the sections of the kernel between the window's planes. Everything behind the last
@@ -238,8 +243,10 @@ impl<'a> Projected<'a> {
         if !from_table {
             strength *= exp(simd, along.rho2 * -0.5);
         }
-        if record.strength < 0.0 {
-            strength = trained_depth(simd, -strength);
+        let is_trained = record.strength < 0.0;
+        let order = plan.single();
+        if is_trained && order.is_none() {
+            strength = trained_depth(simd, trained_share(simd, -strength));
         }
         if record.kind == Kind::Classified {
             // Whitened length to world length along the ray.
@@ -250,7 +257,7 @@ impl<'a> Projected<'a> {
         }
         let mut counts = along.inside;
         if plan.has_clips() {
-            counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
+            counts &= is_kept(plan, rays, along.l * along.inverse2 / rays.cosine);
         }
         if (plan.is_whole() || plan.by_centers) && plan.view.perspective {
             // The kernel's middle must be in front of the eye.
@@ -258,11 +265,15 @@ impl<'a> Projected<'a> {
         }
         let strength = counts.select(strength, none);
         let sections = self.sections(simd, plan, &along, from_table);
-        if let Some(order) = plan.single() {
-            single(simd, plan, record, strength * sections[0], order, packet);
+        if let Some(order) = order {
+            let share = if is_trained {
+                trained_share(simd, -strength)
+            } else {
+                Lanes::splat(simd, 1.0) - exp(simd, -(strength * sections[0]))
+            };
+            single(simd, plan, record, share, order, packet);
             return;
         }
-        let [_, payload @ ..] = record.payload;
         for (offset, section) in sections.iter().enumerate().take(self.count + 1) {
             let depth = strength * *section;
             let adds = depth.abs().simd_gt(LEAST_ADDED);
@@ -273,10 +284,11 @@ impl<'a> Projected<'a> {
             let slot = (self.window.front + offset) % WINDOW;
             sums.has_radiance[slot] |= packet.bit();
             // The first part of the payload is 1.
-            let [whole, parts @ ..] = &mut sums.radiance[slot][packet.number];
-            *whole += depth;
-            for (sum, part) in parts.iter_mut().zip(payload) {
-                *sum = depth.mul_add(Lanes::splat(simd, part), *sum);
+            let sums = &mut sums.radiance[slot][packet.number];
+            sums[0] += depth;
+            let parts = if plan.has_normals { 1..8 } else { 2..5 };
+            for (sum, part) in sums[parts.clone()].iter_mut().zip(&record.payload[parts]) {
+                *sum = depth.mul_add(Lanes::splat(simd, *part), *sum);
             }
         }
     }
@@ -397,22 +409,29 @@ impl<'a> Projected<'a> {
     }
 }
 
-/// Returns the optical depth with which a trained Gaussian covers shares of pixels: −ln(1 − α).
+/// Returns the shares of pixels that a trained Gaussian covers, by its opacity there.
+#[inline(always)]
+fn trained_share<S: Simd>(simd: S, opacity: Lanes<S>) -> Lanes<S> {
+    let [least, most] = TRAINED_OPACITIES.map(|share| Lanes::splat(simd, share as f32));
+    opacity.simd_ge(least).select(opacity.min(most), Lanes::splat(simd, 0.0))
+}
+
+/// Returns the optical depth that covers shares of pixels, of up to 0.99: −ln(1 − α).
 #[inline(always)]
 fn trained_depth<S: Simd>(simd: S, share: Lanes<S>) -> Lanes<S> {
-    let [least, most] = TRAINED_OPACITIES.map(|share| share as f32);
-    let alpha = share.min(Lanes::splat(simd, most));
-    // −ln(1 − α) = 2·artanh(α/(2 − α)). For small shares its series is more precise than a
-    // logarithm.
-    let y = alpha / (2.0 - alpha);
-    let y2 = y * y;
-    let mut series = Lanes::splat(simd, 2.0 / 9.0);
-    for term in [2.0 / 7.0, 2.0 / 5.0, 2.0 / 3.0, 2.0] {
-        series = series.mul_add(y2, Lanes::splat(simd, term));
+    // 1 − α is 2 to the power e times m, with m from √½ to √2, so small shares have e = 0.
+    const ROOT: i32 = 0x3f35_04f3;
+    let bits = (1.0 - share).bitcast::<i32x8<S>>();
+    let exponent = (bits - ROOT) >> 23;
+    let m = (bits - (exponent << 23)).bitcast::<Lanes<S>>();
+    // −ln m = 2·artanh((1 − m)/(1 + m)).
+    let z = (1.0 - m) / (m + 1.0);
+    let z2 = z * z;
+    let mut series = Lanes::splat(simd, 2.0 / 7.0);
+    for term in [2.0 / 5.0, 2.0 / 3.0, 2.0] {
+        series = series.mul_add(z2, Lanes::splat(simd, term));
     }
-    let log = log2(simd, 1.0 - alpha) * -std::f32::consts::LN_2;
-    let depth = alpha.simd_lt(0.5).select(series * y, log);
-    alpha.simd_ge(least).select(depth, Lanes::splat(simd, 0.0))
+    Lanes::float_from(exponent).mul_add(Lanes::splat(simd, -std::f32::consts::LN_2), series * z)
 }
 
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
@@ -539,13 +558,14 @@ fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
     }
 }
 
-/// Composites a splat alone, in front of or behind the pixels so far.
+/// Composites a splat alone, in front of or behind the pixels so far. `share` is what it absorbs of
+/// their light.
 #[inline(always)]
 fn single<S: Simd>(
     simd: S,
     plan: &Plan,
     record: &Record,
-    depth: Lanes<S>,
+    share: Lanes<S>,
     order: Order,
     packet: &mut Packet<S>,
 ) {
@@ -557,20 +577,18 @@ fn single<S: Simd>(
         let on = (&packet.rays, Lanes::splat(simd, 0.0));
         color = plan.lit_surface(simd, color, normal, on);
     }
-    let one = Lanes::splat(simd, 1.0);
-    let left = exp(simd, -depth);
     let pixels = &mut packet.pixels;
     let before = pixels.through;
-    let counts = depth.simd_gt(0.0);
-    let left = counts.select(left, one);
+    let left = 1.0 - share;
     let takes_half = match order {
         Order::BackToFront => {
-            pixels.color = three!(I => pixels.color[I] * left + (one - left) * color[I]);
+            pixels.color = three!(I => share.mul_add(color[I], pixels.color[I] * left));
             left.simd_le(0.5)
         }
         Order::FrontToBack => {
-            let share = before * (one - left);
+            let share = before * share;
             pixels.color = three!(I => share.mul_add(color[I], pixels.color[I]));
+            packet.is_done = !(before * left).simd_ge(OPAQUE).any_true();
             before.simd_gt(0.5) & (before * left).simd_le(0.5)
         }
     };

@@ -21,7 +21,8 @@ const LEAST_DEPTH: f32 = 1e-5;
 const LIT_BY: f32 = 2.0;
 
 /// The radiance sums of eight pixels: optical depth; then the facing weights, colours and normals,
-/// each weighted by optical depth.
+/// each weighted by optical depth. If no splat has a normal, facing weights are all 1, and neither
+/// these nor normals are added.
 pub type Radiance<S> = [Lanes<S>; 8];
 
 /// Sums of a field in a sheet at eight pixels: weights and weighted values.
@@ -171,8 +172,11 @@ impl<S: Simd> Sums<S> {
             return None;
         }
         self.has_radiance[slot] &= !packet.bit();
-        let [depth, facing, red, green, blue, x, y, z] =
+        let [depth, mut facing, red, green, blue, x, y, z] =
             std::mem::replace(&mut self.radiance[slot][packet.number], [self.none; 8]);
+        if !plan.has_normals {
+            facing = depth;
+        }
         let one = Lanes::splat(simd, 1.0);
         // If next to nothing faces the eye, rounding may have left a weight of any sign.
         let inverse = one / facing.max(Lanes::splat(simd, 1e-12));
