@@ -226,8 +226,8 @@ impl FieldState {
             f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
         });
         let steps = steps.fold(0.0, f64::max) * sheets.step;
-        let lookups =
-            if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
+        let parts = (steps / visible::MOST_APART).ceil() as usize;
+        let lookups = if parts <= 1 { 0 } else { parts };
         let parts = gathering::parts(slice::from_ref(&self.item), sheets, outline.choice.as_ref());
         let deviation = self.item.kernel().and_then(deviation);
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);

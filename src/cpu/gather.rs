@@ -43,8 +43,8 @@ pub struct Gather<'a> {
     /// One over the kernel's standard deviation, in steps, if the field ends with the lattice.
     /// Tensor products do not end.
     pub ends: Option<f32>,
-    /// Number of parts of a sheet at whose ends visibility is looked up. It is 0 if sheets are no
-    /// thicker than the lattice's steps: then a whole sheet lies within half a step of its middle.
+    /// Number of parts of a sheet at whose ends visibility is looked up. It is 0 if sheets are thin:
+    /// then a whole sheet lies near enough to its middle.
     pub lookups: usize,
     /// There may be places without a field, and places where the kernels' sum is larger than
     /// elsewhere.
@@ -139,9 +139,6 @@ const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
 /// Distance from a sample, in standard deviations, beyond which a Gaussian is too small for a
 /// value: 10⁻⁴ of its peak.
 const LAST_VALUE: f32 = 4.29;
-
-/// Maximum distance of the places at which visibility is looked up, in steps.
-pub const MOST_APART: f64 = 1.1;
 
 /// Number of sheets looked up at once.
 const LOOKED_UP: usize = 8;

@@ -1,7 +1,7 @@
 //! The samples around eight places, four or two along each axis, loaded as vectors.
 
 use super::vector::{Lanes, each, four, words};
-use fearless_simd::{Simd, f32x4, i16x16, i32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, f32x4, i16x16, i32x8, prelude::*, u32x8, u64x4};
 
 /// The memory layout of `N` samples in each of `R` rows of `R` slices around eight places.
 pub struct Window<'a, T, const N: usize, const R: usize = N> {
@@ -312,10 +312,9 @@ macro_rules! two_bytes {
                 weights: &Pairs<S>,
                 _: f32,
             ) -> [Lanes<S>; 2] {
-                let a = words!(simd, L => in_word(window.row(L, [0, row, slice])));
-                let b = words!(simd, L => in_word(window.row(L, [2, row, slice])));
                 let turned: u32 = $turned;
-                weights.sums([a ^ turned, b ^ turned])
+                let pairs = pairs_of_words(simd, window, [0, row, slice]);
+                weights.sums(each!([0, 1], I => pairs[I] ^ turned))
             }
 
             #[inline(always)]
@@ -324,9 +323,9 @@ macro_rules! two_bytes {
                 window: &Window<Self, N, R>,
                 first: [usize; 3],
             ) -> [Lanes<S>; 4] {
-                let [a, b] = each!([0, 2], I => {
-                    let [at, row, slice] = first;
-                    let $word = words!(simd, L => in_word(window.row(L, [at + I, row, slice])));
+                let pairs = pairs_of_words(simd, window, first);
+                let [a, b] = each!([0, 1], I => {
+                    let $word = pairs[I];
                     [Lanes::float_from($first), Lanes::float_from($second)]
                 });
                 [a[0], a[1], b[0], b[1]]
@@ -353,6 +352,24 @@ two_bytes!(u16, 0x8000_8000, 32768.0, word => (word & 0xffff).bitcast::<i32x8<S>
     (word >> 16).bitcast::<i32x8<S>>());
 two_bytes!(i16, 0, 0.0, word => (word << 16).bitcast::<i32x8<S>>() >> 16,
     word.bitcast::<i32x8<S>>() >> 16);
+
+/// Returns four successive samples of each lane, two in a word. Each lane is loaded at once.
+#[inline(always)]
+fn pairs_of_words<S: Simd, T: Into<i32> + Copy, const N: usize, const R: usize>(
+    simd: S,
+    window: &Window<T, N, R>,
+    first: [usize; 3],
+) -> [u32x8<S>; 2] {
+    let [low, high] = each!([0, 4], HALF => {
+        let lanes: u64x4<S> = four!(L => {
+            let [a, b, c, d] = window.row(HALF + L, first);
+            u64::from(in_word([a, b])) | u64::from(in_word([c, d])) << 32
+        })
+        .simd_into(simd);
+        lanes.bitcast::<u32x8<S>>()
+    });
+    [low.unzip_low(high), low.unzip_high(high)]
+}
 
 /// Packs two successive samples into a word.
 #[inline(always)]

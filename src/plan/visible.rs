@@ -6,7 +6,7 @@ use crate::{
     parallel::{self, prelude::*},
     volume::{
         Arrangement, Lattice, Volume,
-        reach::{near_and_far_ranges, neighbourhood_ranges, turned},
+        reach::{self, near_and_far_ranges, neighbourhood_ranges, turned, weighted_ranges},
     },
 };
 use glam::{DAffine3, DMat3, DVec3};
@@ -36,24 +36,27 @@ struct Span {
 /// The bits of 2 × 2 × 2 cells in a word.
 const QUARTER: u32 = 0x0033_0033;
 
-/// The widest Gaussian, in steps, for which [`Shares::GAUSSIAN`] holds.
+/// How far from a sample the places may lie that are looked up by it, in steps along an axis: in
+/// its cell, and up to a third of a step further away.
+const FARTHEST: f64 = 0.5 + MOST_APART / 2.0;
+/// Maximum distance of the places on a ray at which visibility is looked up, in steps.
+pub const MOST_APART: f64 = 0.67;
+/// The widest Gaussian whose field is made of two samples on either side, in steps.
 const WIDEST: f64 = 0.6;
 
-/// What the samples around a sample count at most in the field at the places nearest to it, in
-/// hundredths. It allows for places up to a third of a step further away along one axis.
+/// What the samples around a sample count at most in the field at the places that are looked up by
+/// it.
 #[derive(Debug, Clone, Copy)]
-struct Shares {
-    /// The sum of the magnitudes of the weights of samples two steps from the sample.
-    far: u16,
-    /// The sum of those of the negative weights of the samples next to it.
-    negative: u16,
+enum Shares {
+    /// Of positive weights, along an axis.
+    Positive(reach::Shares),
+    /// Of Catmull & Rom's, in all, in hundredths: the magnitudes of the weights of samples two
+    /// steps away, and of the negative ones of samples next to it.
+    Negative([u16; 2]),
 }
 
 impl Shares {
-    /// Those of the usual kernel. At half a step the far samples have a weight of 0.085.
-    const GAUSSIAN: Self = Self { far: 15, negative: 0 };
-    const CUBIC_B_SPLINE: Self = Self { far: 14, negative: 0 };
-    const CATMULL_ROM: Self = Self { far: 30, negative: 28 };
+    const CATMULL_ROM: Self = Self::Negative([30, 28]);
 
     /// Returns those of a kernel of which only samples up to two steps away count, if they are
     /// known.
@@ -61,39 +64,51 @@ impl Shares {
         match kernel.as_tensor() {
             Some(Tensor::Linear) => None,
             Some(Tensor::CatmullRom) => Some(Self::CATMULL_ROM),
-            Some(Tensor::CubicBSpline) => Some(Self::CUBIC_B_SPLINE),
-            None => deviation(kernel).filter(|&sigma| sigma <= WIDEST).map(|_| Self::GAUSSIAN),
+            Some(tensor) => Some(Self::positive(|steps| tensor.value(steps))),
+            None => {
+                let sigma = deviation(kernel).filter(|&sigma| sigma <= WIDEST)?;
+                Some(Self::positive(|steps| (-0.5 * (steps / sigma).powi(2)).exp()))
+            }
         }
     }
 
-    /// Replaces the ranges of the samples up to two steps away by those of the field, with the
-    /// ranges of the samples next to a sample ([`near_and_far_ranges`]).
-    fn narrow(self, near: &[[u8; 2]], far: &mut [[u8; 2]]) {
-        let share = |number: u16, hundredths: u16| (number * hundredths).div_ceil(100);
-        if self.negative == 0 {
-            // Both ends in the same way: vector instructions do many at once.
-            for (out, near) in far.as_flattened_mut().iter_mut().zip(near.as_flattened()) {
-                let beyond = near.saturating_sub(*out);
-                *out = near - share(beyond.into(), self.far) as u8;
-            }
-            return;
-        }
-        for (out, near) in far.iter_mut().zip(near) {
-            let [low, high] = turned(*near).map(u16::from);
-            let [lowest, highest] = turned(*out).map(u16::from);
-            // A negative weight moves the field away from its sample.
-            let below = (low - lowest).max(highest - low);
-            let above = (highest - high).max(high - lowest);
-            let wider = |beyond: u16| share(beyond, self.far) + share(high - low, self.negative);
-            let range = [low.saturating_sub(wider(below)), (high + wider(above)).min(255)];
-            *out = turned(range.map(|number| number as u8));
-        }
+    /// Returns those of positive weights, by the distance in steps. A place takes the two samples
+    /// on either side.
+    fn positive(weight: impl Fn(f64) -> f64) -> Self {
+        let most = |of: &[f64]| {
+            let shares = (0..=100).map(|part| {
+                let place = f64::from(part) / 100.0 * FARTHEST;
+                let sum = |taps: &[f64]| taps.iter().map(|tap| weight(tap - place)).sum::<f64>();
+                sum(of) / sum(&[-1.0, 0.0, 1.0, 2.0])
+            });
+            shares.fold(0.0, f64::max) * 256.0
+        };
+        let (near, far) = (most(&[-1.0, 1.0]).ceil() as u8, most(&[2.0]).ceil() as u8);
+        // Two less, as samples beyond the border weigh nothing.
+        let others = (256.0 - most(&[0.0]).ceil() - 2.0).max(0.0) as u8;
+        Self::Positive(reach::Shares { near, far, others })
     }
 }
 
-/// Returns, for each sample of a volume, the range of the field at the places nearest to that
-/// sample. The samples next to it have nearly all the weight; those two steps away move the field
-/// by at most their share.
+/// Replaces the ranges of the samples up to two steps away by those of the field, with the ranges
+/// of the samples next to a sample ([`near_and_far_ranges`]). The shares are those of
+/// [`Shares::Negative`].
+fn narrow([far_share, negative]: [u16; 2], near: &[[u8; 2]], far: &mut [[u8; 2]]) {
+    let share = |number: u16, hundredths: u16| (number * hundredths).div_ceil(100);
+    for (out, near) in far.iter_mut().zip(near) {
+        let [low, high] = turned(*near).map(u16::from);
+        let [lowest, highest] = turned(*out).map(u16::from);
+        // A negative weight moves the field away from its sample.
+        let below = (low - lowest).max(highest - low);
+        let above = (highest - high).max(high - lowest);
+        let wider = |beyond: u16| share(beyond, far_share) + share(high - low, negative);
+        let range = [low.saturating_sub(wider(below)), (high + wider(above)).min(255)];
+        *out = turned(range.map(|number| number as u8));
+    }
+}
+
+/// Returns, for each sample of a volume, the range of the field at the places that are looked up by
+/// that sample: those nearest to it, and up to a third of a step further away.
 pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     if volume.is_label_map() {
         // A lookup may miss the nearest sample by one.
@@ -101,7 +116,10 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     }
     let reaches_two = volume.lattice.arrangement == Arrangement::Cartesian && kernel.extent > 1.0;
     match Shares::of(kernel).filter(|_| reaches_two && volume.coefficients.is_none()) {
-        Some(shares) => near_and_far_ranges(volume, |near, far| shares.narrow(near, far)),
+        Some(Shares::Positive(shares)) => weighted_ranges(volume, shares),
+        Some(Shares::Negative(shares)) => {
+            near_and_far_ranges(volume, |near, far| narrow(shares, near, far))
+        }
         None => volume.drawn_ranges(kernel).into_owned(),
     }
 }
@@ -409,25 +427,40 @@ mod tests {
 
     #[test]
     fn shares_hold_for_the_places_nearest_to_a_sample() {
-        let kernels = [
-            (Tensor::CatmullRom, Shares::CATMULL_ROM),
-            (Tensor::CubicBSpline, Shares::CUBIC_B_SPLINE),
-        ];
-        for (tensor, most) in kernels {
-            let mut largest = [0.0f64; 2];
-            for x in 0..=10 {
-                for y in 0..=6 {
-                    for z in 0..=6 {
-                        let place = [x, y, z].map(|step| f64::from(step) / 12.0);
-                        let shares = shares(tensor, place);
-                        largest = [0, 1].map(|i| largest[i].max(shares[i]));
-                    }
+        let Shares::Negative(most) = Shares::CATMULL_ROM else { panic!("negative weights") };
+        let mut largest = [0.0f64; 2];
+        for x in 0..=10 {
+            for y in 0..=6 {
+                for z in 0..=6 {
+                    let place = [x, y, z].map(|step| f64::from(step) / 12.0);
+                    let shares = shares(Tensor::CatmullRom, place);
+                    largest = [0, 1].map(|i| largest[i].max(shares[i]));
                 }
             }
-            let most = [most.far, most.negative].map(f64::from);
-            for (largest, most) in largest.into_iter().zip(most) {
-                assert!(most - 1.0 < largest && largest <= most, "{tensor:?}: {largest} {most}");
+        }
+        for (largest, most) in largest.into_iter().zip(most.map(f64::from)) {
+            assert!(most - 1.0 < largest && largest <= most, "{largest} {most}");
+        }
+        // Weights along an axis. At the farthest place, the sample itself has the rest.
+        for kernel in [Kernel::default(), Kernel::tensor(Tensor::CubicBSpline)] {
+            let Some(Shares::Positive(shares)) = Shares::of(&kernel) else {
+                panic!("positive weights")
+            };
+            let value = |steps: f64| match kernel.as_tensor() {
+                Some(tensor) => tensor.value(steps),
+                None => kernel.value(steps.abs()),
+            };
+            let weights = [-1.0, 0.0, 1.0, 2.0].map(|tap| value(tap - FARTHEST));
+            let all: f64 = weights.iter().sum();
+            let expected = [weights[0] + weights[2], weights[3]].map(|weight| weight / all * 256.0);
+            for (share, expected) in [shares.near, shares.far].into_iter().zip(expected) {
+                let share = f64::from(share);
+                assert!(expected <= share && share < expected + 1.0, "{expected} {share}");
             }
+            let weights = [-1.0, 0.0, 1.0, 2.0].map(value);
+            let others = 256.0 * (1.0 - weights[1] / weights.iter().sum::<f64>());
+            let found = f64::from(shares.others);
+            assert!(others - 4.0 < found && found < others - 1.0, "{found} {others}");
         }
     }
 

@@ -17,8 +17,11 @@ use crate::parallel::{self, prelude::*};
 /// # Panics
 /// If the samples do not fill the lattice.
 pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]> {
-    let finish = |_, out: &mut [[u8; 2]]| out.iter_mut().for_each(|range| *range = turned(*range));
-    ranges_of_steps(volume, radius, finish)
+    ranges_of_steps(volume, Joined::Smallest(radius), turn_all)
+}
+
+fn turn_all(_: usize, ranges: &mut [[u8; 2]]) {
+    ranges.iter_mut().for_each(|range| *range = turned(*range));
 }
 
 /// Returns for each sample what `combine` makes of two such ranges: those of the samples next to
@@ -33,7 +36,7 @@ pub fn near_and_far_ranges(
     combine: impl Fn(&[[u8; 2]], &mut [[u8; 2]]) + Sync,
 ) -> Vec<[u8; 2]> {
     let dims = volume.lattice.dims;
-    let near = ranges_of_steps(volume, [1; 3], |_, _| ());
+    let near = ranges_of_steps(volume, Joined::Smallest([1; 3]), |_, _| ());
     let fill = |row: usize, out: &mut [[u8; 2]]| {
         out.copy_from_slice(&near[row * dims[0]..][..dims[0]]);
     };
@@ -41,19 +44,92 @@ pub fn near_and_far_ranges(
         combine(&near[first..][..out.len()], out);
         out.iter_mut().for_each(|range| *range = turned(*range));
     };
-    boxes(dims, [1; 3], fill, finish)
+    boxes(dims, Joined::Smallest([1; 3]), fill, finish)
+}
+
+/// Parts of the weight of samples along an axis, in 256ths.
+#[derive(Debug, Clone, Copy)]
+pub struct Shares {
+    /// The most that the samples next to a sample weigh.
+    pub near: u8,
+    /// The most that those two steps away weigh.
+    pub far: u8,
+    /// The least that both weigh together.
+    pub others: u8,
+}
+
+/// Returns for each sample the range of the field around it, if the field is a mean of the samples
+/// up to two steps away along each axis, weighted by products of weights of the axes. The result is
+/// in steps of the volume's range, as that of [`neighbourhood_ranges`] is.
+///
+/// # Panics
+/// If the samples do not fill the lattice, or if the shares exceed 1 together.
+pub fn weighted_ranges(volume: &Volume, shares: Shares) -> Vec<[u8; 2]> {
+    let most = u16::from(shares.near) + u16::from(shares.far);
+    assert!(most <= 256, "the shares {shares:?} exceed 1");
+    ranges_of_steps(volume, Joined::Weighted(shares), turn_all)
+}
+
+/// How a sample and its neighbours along an axis become one pair of a range's smallest number and
+/// 255 minus the largest one.
+#[derive(Clone, Copy)]
+enum Joined {
+    /// The smallest numbers of samples up to so many steps away.
+    Smallest([usize; 3]),
+    /// The smallest weighted mean of samples up to two steps away.
+    Weighted(Shares),
+}
+
+impl Joined {
+    /// Returns how far the neighbours are along an axis of `count` samples.
+    fn reach(self, axis: usize, count: usize) -> usize {
+        match self {
+            Self::Smallest(radius) => radius[axis].min(count.saturating_sub(1)),
+            Self::Weighted(_) => 2,
+        }
+    }
+
+    /// Sets `out` to what becomes of a line of samples. `line` returns that line and its neighbours
+    /// across, from `reach` before it to `reach` behind it.
+    fn join<'a>(self, out: &mut [[u8; 2]], reach: usize, line: impl Fn(usize) -> &'a [[u8; 2]]) {
+        let shares = match self {
+            Self::Weighted(shares) => shares,
+            Self::Smallest(_) => {
+                out.copy_from_slice(line(reach));
+                (0..=2 * reach).for_each(|number| smaller(out, line(number)));
+                return;
+            }
+        };
+        let [near_share, far_share, others_share] =
+            [shares.near, shares.far, shares.others].map(u16::from);
+        let [before, near_before, own, near_behind, behind] =
+            [0, 1, 2, 3, 4].map(|number| line(number).as_flattened());
+        let near = near_before.iter().zip(near_behind);
+        let far = before.iter().zip(behind);
+        let out = out.as_flattened_mut().iter_mut();
+        for (((out, own), near), far) in out.zip(own).zip(near).zip(far) {
+            let (near, far) = (*near.0.min(near.1), *far.0.min(far.1));
+            let below = |other: u8| u16::from(own.saturating_sub(other));
+            // At most all that it lies above them, as the shares are at most 1.
+            let down = (below(near) * near_share + below(far) * far_share + 255) >> 8;
+            // If it lies below all of them, they raise the mean. At the border some of them weigh
+            // nothing, but there a repeated sample is no higher.
+            let up = (u16::from(near.min(far).saturating_sub(*own)) * others_share) >> 8;
+            *out = own - down as u8 + up as u8;
+        }
+    }
 }
 
 /// Returns the ranges around the samples of a volume after `finish`: see [`boxes`].
 fn ranges_of_steps(
     volume: &Volume,
-    radius: [usize; 3],
+    joined: Joined,
     finish: impl Fn(usize, &mut [[u8; 2]]) + Sync,
 ) -> Vec<[u8; 2]> {
     let steps = Steps::new(volume.samples.scalar(), volume.range);
     let (samples, count) = (volume.samples.bytes(), volume.lattice.dims[0]);
     let fill = |row: usize, out: &mut [[u8; 2]]| steps.write(steps.from(samples, row * count), out);
-    boxes(volume.lattice.dims, radius, fill, finish)
+    boxes(volume.lattice.dims, joined, fill, finish)
 }
 
 /// Returns a range with 255 minus its second number in place of that number.
@@ -61,53 +137,50 @@ pub fn turned([low, high]: [u8; 2]) -> [u8; 2] {
     [low, 255 - high]
 }
 
-/// Returns the smallest pairs of bytes in the boxes around samples. `fill` writes those of a row.
-/// `finish` changes a slice of the result; the number of its first sample comes with it.
+/// Returns what becomes of samples and the boxes around them, one axis after the other. `fill`
+/// writes the pairs of a row. `finish` changes a slice of the result; the number of its first
+/// sample comes with it. Beyond the borders, the outermost samples repeat.
 fn boxes(
     dims: [usize; 3],
-    radius: [usize; 3],
+    joined: Joined,
     fill: impl Fn(usize, &mut [[u8; 2]]) + Sync,
     finish: impl Fn(usize, &mut [[u8; 2]]) + Sync,
 ) -> Vec<[u8; 2]> {
     let [nx, ny, nz] = dims;
     let slice = nx * ny;
-    let reach = |axis: usize| radius[axis].min(dims[axis].saturating_sub(1));
-    let (rx, ry, rz) = (reach(0), reach(1), reach(2));
+    let [rx, ry, rz] = [0, 1, 2].map(|axis| joined.reach(axis, dims[axis]));
     // Every slab recomputes the slices that reach into it, so slabs are thick compared with the
     // radius.
     let slab = nz.div_ceil(4 * parallel::current_num_threads()).max(8 * rz).max(1);
     let mut ranges = vec![[0u8; 2]; slice * nz];
     ranges.par_chunks_mut((slab * slice).max(1)).enumerate().for_each(|(index, slab_ranges)| {
         let mut scratch = vec![[0u8; 2]; slice];
-        let mut row = vec![[0u8; 2]; nx];
+        let mut row = vec![[0u8; 2]; nx + 2 * rx];
         // Slices that are finished along x and y: slice k is in entry k modulo the length.
         let mut ring = vec![vec![[0u8; 2]; slice]; 2 * rz + 1];
         let first = index * slab;
         let mut next = first.saturating_sub(rz);
         for (k, out) in (first..).zip(slab_ranges.chunks_mut(slice)) {
-            let around = k.saturating_sub(rz)..(k + rz + 1).min(nz);
-            while next < around.end {
+            while next < (k + rz + 1).min(nz) {
                 for (j, out) in scratch.chunks_mut(nx).enumerate() {
-                    fill(next * ny + j, &mut row);
-                    out.copy_from_slice(&row);
-                    for shift in 1..=rx {
-                        smaller(&mut out[..nx - shift], &row[shift..]);
-                        smaller(&mut out[shift..], &row[..nx - shift]);
-                    }
+                    fill(next * ny + j, &mut row[rx..rx + nx]);
+                    let ends = [row[rx], row[rx + nx - 1]];
+                    row[..rx].fill(ends[0]);
+                    row[rx + nx..].fill(ends[1]);
+                    joined.join(out, rx, |number| &row[number..number + nx]);
                 }
                 let place = next % ring.len();
                 for (j, out) in ring[place].chunks_mut(nx).enumerate() {
-                    out.copy_from_slice(&scratch[j * nx..(j + 1) * nx]);
-                    for other in j.saturating_sub(ry)..(j + ry + 1).min(ny) {
-                        smaller(out, &scratch[other * nx..(other + 1) * nx]);
-                    }
+                    joined.join(out, ry, |number| {
+                        let other = (j + number).saturating_sub(ry).min(ny - 1);
+                        &scratch[other * nx..(other + 1) * nx]
+                    });
                 }
                 next += 1;
             }
-            out.copy_from_slice(&ring[k % ring.len()]);
-            for other in around {
-                smaller(out, &ring[other % ring.len()]);
-            }
+            joined.join(out, rz, |number| {
+                &ring[(k + number).saturating_sub(rz).min(nz - 1) % ring.len()]
+            });
             finish(k * slice, out);
         }
     });
@@ -231,6 +304,46 @@ mod tests {
             let [near, far] = [1, 2].map(|radius| neighbourhood_ranges(&volume, [radius; 3]));
             assert_eq!(near_and_far_ranges(&volume, |near, out| out.copy_from_slice(near)), near);
             assert_eq!(near_and_far_ranges(&volume, |_, _| ()), far);
+        }
+    }
+
+    #[test]
+    fn weighted_means_stay_in_their_ranges() {
+        let mut random = Random(13);
+        let shares = Shares { near: 150, far: 40, others: 60 };
+        for _ in 0..100 {
+            let volume = random_volume(&mut random);
+            let dims = volume.lattice.dims;
+            let [lowest, highest] = volume.range;
+            let scale = if highest > lowest { 255.0 / (highest - lowest) } else { 0.0 };
+            let ranges = weighted_ranges(&volume, shares);
+            for index in 0..volume.len() {
+                let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
+                // Weights of a sample, of the next one and the one behind it, on either side.
+                let weights = [0; 3].map(|_| {
+                    let mut parts = [shares.near, shares.far]
+                        .map(|most| random.next(u64::from(most) + 1) as f64 / 256.0);
+                    let least = f64::from(shares.others) / 256.0;
+                    if parts[0] + parts[1] < least {
+                        parts[0] = least - parts[1];
+                    }
+                    [1.0 - parts[0] - parts[1], parts[0], parts[1]]
+                });
+                let sides = [0; 3].map(|_| random.next(2) as isize * 2 - 1);
+                let mut mean = 0.0;
+                for tap in 0..27 {
+                    let steps = [tap % 3, tap / 3 % 3, tap / 9];
+                    let [i, j, k] = [0, 1, 2].map(|axis| {
+                        let place = at[axis] as isize + sides[axis] * steps[axis] as isize;
+                        place.clamp(0, dims[axis] as isize - 1) as usize
+                    });
+                    let weight: f64 = (0..3).map(|axis| weights[axis][steps[axis]]).product();
+                    mean += weight * volume.value((k * dims[1] + j) * dims[0] + i);
+                }
+                let mean = (mean - lowest) * scale;
+                let [low, high] = ranges[index].map(f64::from);
+                assert!(low - 1e-6 <= mean && mean <= high + 1e-6, "{index} {low} {mean} {high}");
+            }
         }
     }
 
