@@ -140,6 +140,9 @@ const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
 /// value: 10⁻⁴ of its peak.
 const LAST_VALUE: f32 = 4.29;
 
+/// After so many successive sheets that show something, the next one is taken to do so too, and not
+/// looked up.
+const SURE: u8 = 4;
 /// Number of sheets looked up at once.
 const LOOKED_UP: usize = 8;
 
@@ -156,6 +159,8 @@ pub struct Last<S: Simd> {
     /// may be visible.
     first: usize,
     shows: [u8; LOOKED_UP],
+    /// The number of successive sheets that showed something until the last one.
+    shown: u8,
 }
 
 /// The field on a plane.
@@ -194,6 +199,7 @@ impl<S: Simd> Last<S> {
             far_plane: usize::MAX,
             first: usize::MAX - LOOKED_UP,
             shows: [0; LOOKED_UP],
+            shown: 0,
         }
     }
 }
@@ -242,13 +248,16 @@ impl Gather<'_> {
         let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));
-        let mask = begin.simd_lt(end) & pixels.through.simd_ge(OPAQUE);
+        let mut mask = begin.simd_lt(end) & pixels.through.simd_ge(OPAQUE);
         if !mask.any_true() {
             return None;
         }
-        let mask = mask & self.showing(simd, rays, sheet, marks, last);
-        if !mask.any_true() {
-            return None;
+        let shown = std::mem::take(&mut last.shown);
+        if shown < SURE {
+            mask &= self.showing(simd, rays, sheet, marks, last);
+            if !mask.any_true() {
+                return None;
+            }
         }
         if self.is_label_map {
             let layer = self.label_layer(simd, rays, [start, stop], [begin, end]);
@@ -277,6 +286,9 @@ impl Gather<'_> {
         layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
         if !has_gaps && !layer.weight.simd_gt(0.0).any_true() {
             return None;
+        }
+        if !self.is_blended && self.plan.optics != Optics::Maximum {
+            last.shown = shown.saturating_add(1);
         }
         let is_bent = self.is_bent([&front, &back], bend, &layer, mask);
         if self.has_far_gradient {
