@@ -43,8 +43,8 @@ pub struct Gather<'a> {
     /// One over the kernel's standard deviation, in steps, if the field ends with the lattice.
     /// Tensor products do not end.
     pub ends: Option<f32>,
-    /// Number of parts of a sheet at whose ends visibility is looked up. It is 0 if sheets are thin:
-    /// then a whole sheet lies near enough to its middle.
+    /// Number of parts of a sheet at whose ends visibility is looked up. It is 0 if sheets are
+    /// thin: then a whole sheet lies near enough to its middle.
     pub lookups: usize,
     /// There may be places without a field, and places where the kernels' sum is larger than
     /// elsewhere.
@@ -263,6 +263,26 @@ impl Gather<'_> {
             let layer = self.label_layer(simd, rays, [start, stop], [begin, end]);
             return self.may_show(simd, &layer).then_some((layer, mask));
         }
+        let found = self.sheet(simd, packet, sheet, ([begin, end], mask), last)?;
+        if !self.is_blended && plan.optics != Optics::Maximum {
+            last.shown = shown.saturating_add(1);
+        }
+        Some(found)
+    }
+
+    /// Returns the field of a sheet between two distances, at the rays of a mask, and the rays on
+    /// which it counts; `None` if it is invisible.
+    #[inline(always)]
+    fn sheet<S: Simd>(
+        &self,
+        simd: S,
+        packet: &Packet<S>,
+        sheet: usize,
+        ([begin, end], mask): ([Lanes<S>; 2], mask32x8<S>),
+        last: &mut Last<S>,
+    ) -> Option<(Layer<S>, mask32x8<S>)> {
+        let (plan, rays, pixels) = (self.plan, packet.rays_in(self.plan), &packet.pixels);
+        let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let front = if last.plane == sheet { last.on } else { self.on_plane(simd, rays, sheet) };
         let back = self.on_plane(simd, rays, sheet + 1);
         last.plane = sheet + 1;
@@ -286,9 +306,6 @@ impl Gather<'_> {
         layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
         if !has_gaps && !layer.weight.simd_gt(0.0).any_true() {
             return None;
-        }
-        if !self.is_blended && self.plan.optics != Optics::Maximum {
-            last.shown = shown.saturating_add(1);
         }
         let is_bent = self.is_bent([&front, &back], bend, &layer, mask);
         if self.has_far_gradient {

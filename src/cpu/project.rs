@@ -134,7 +134,7 @@ impl<'a> Projector<'a> {
                 let center = Vec3::from_array(three!(I => center[I][lane]));
                 match whole_sheet(self.plan, center, distance[lane]) {
                     Some(sheet) => {
-                        (sheets[0][lane], sheets[1][lane]) = (sheet as u16, sheet as u16)
+                        (sheets[0][lane], sheets[1][lane]) = (sheet as u16, sheet as u16);
                     }
                     None => bits &= !(1 << lane),
                 }

@@ -108,7 +108,7 @@ fn narrow([far_share, negative]: [u16; 2], near: &[[u8; 2]], far: &mut [[u8; 2]]
 }
 
 /// Returns, for each sample of a volume, the range of the field at the places that are looked up by
-/// that sample: those nearest to it, and up to a third of a step further away.
+/// it. They are nearest to it, or up to a third of a step further away.
 pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     if volume.is_label_map() {
         // A lookup may miss the nearest sample by one.

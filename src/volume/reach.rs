@@ -58,9 +58,9 @@ pub struct Shares {
     pub others: u8,
 }
 
-/// Returns for each sample the range of the field around it, if the field is a mean of the samples
-/// up to two steps away along each axis, weighted by products of weights of the axes. The result is
-/// in steps of the volume's range, as that of [`neighbourhood_ranges`] is.
+/// Returns for each sample the range of the field around it. The field is a mean of the samples up
+/// to two steps away along each axis, weighted by products of the axes' weights. The result is in
+/// steps of the volume's range, as that of [`neighbourhood_ranges`] is.
 ///
 /// # Panics
 /// If the samples do not fill the lattice, or if the shares exceed 1 together.
@@ -317,7 +317,7 @@ mod tests {
             let [lowest, highest] = volume.range;
             let scale = if highest > lowest { 255.0 / (highest - lowest) } else { 0.0 };
             let ranges = weighted_ranges(&volume, shares);
-            for index in 0..volume.len() {
+            for (index, range) in ranges.iter().enumerate() {
                 let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
                 // Weights of a sample, of the next one and the one behind it, on either side.
                 let weights = [0; 3].map(|_| {
@@ -341,7 +341,7 @@ mod tests {
                     mean += weight * volume.value((k * dims[1] + j) * dims[0] + i);
                 }
                 let mean = (mean - lowest) * scale;
-                let [low, high] = ranges[index].map(f64::from);
+                let [low, high] = range.map(f64::from);
                 assert!(low - 1e-6 <= mean && mean <= high + 1e-6, "{index} {low} {mean} {high}");
             }
         }
