@@ -49,19 +49,8 @@ pub struct CellField<'a> {
     shots: Vec<Shot>,
     /// Where the list of each block of tiles begins, and its shots.
     starts: Vec<u32>,
-    listed: Vec<Listed>,
+    listed: Vec<u32>,
     blocks: usize,
-}
-
-/// Pixels along each side of a block of tiles.
-const SIDE: i32 = (BLOCK * TILE) as i32;
-
-/// A shot in the list of a block.
-#[derive(Clone, Copy)]
-struct Listed {
-    shot: u32,
-    /// Its first and last pixel within the block, to the right and down.
-    within: [[u8; 2]; 2],
 }
 
 /// A tetrahedron as a view shows it.
@@ -209,6 +198,7 @@ impl<'a> CellField<'a> {
 
     /// Lists the shots that each block of tiles meets, by first sheet.
     fn list(&mut self, plan: &Plan) {
+        const SIDE: i32 = (BLOCK * TILE) as i32;
         let [columns, rows] = plan.tiles().map(|tiles| tiles.div_ceil(BLOCK));
         self.blocks = columns;
         let met = |shot: &Shot| {
@@ -223,15 +213,10 @@ impl<'a> CellField<'a> {
             starts[block] += starts[block - 1];
         }
         let mut places = starts.clone();
-        let none = Listed { shot: 0, within: [[0; 2]; 2] };
-        self.listed = vec![none; starts[columns * rows] as usize];
-        for (number, shot) in (0..).zip(&self.shots) {
+        self.listed = vec![0; starts[columns * rows] as usize];
+        for (number, shot) in self.shots.iter().enumerate() {
             for block in met(shot) {
-                let corner = [block % columns, block / columns].map(|at| at as i32 * SIDE);
-                let within = [0, 1].map(|axis| {
-                    shot.pixels[axis].map(|pixel| (pixel - corner[axis]).clamp(0, SIDE - 1) as u8)
-                });
-                self.listed[places[block] as usize] = Listed { shot: number, within };
+                self.listed[places[block] as usize] = number as u32;
                 places[block] += 1;
             }
         }
@@ -240,15 +225,18 @@ impl<'a> CellField<'a> {
 
     /// Returns the shots that meet the tile with a first pixel, by first sheet.
     fn of_tile(&self, corner: [i32; 2]) -> Vec<u32> {
+        const SIDE: i32 = (BLOCK * TILE) as i32;
         let [column, row] = corner.map(|first| (first / SIDE) as usize);
         let block = row * self.blocks + column;
         let range = self.starts[block] as usize..self.starts[block + 1] as usize;
-        let [x, y] = [corner[0] - column as i32 * SIDE, corner[1] - row as i32 * SIDE];
-        let meets = |[first, last]: [u8; 2], corner: i32| {
-            i32::from(first) < corner + TILE as i32 && i32::from(last) >= corner
+        let meets = |number: &u32| {
+            let pixels = self.shots[*number as usize].pixels;
+            [0, 1].into_iter().all(|axis| {
+                let [first, last] = pixels[axis];
+                first < corner[axis] + TILE as i32 && last >= corner[axis]
+            })
         };
-        let meets = |listed: &&Listed| meets(listed.within[0], x) && meets(listed.within[1], y);
-        self.listed[range].iter().filter(meets).map(|listed| listed.shot).collect()
+        self.listed[range].iter().copied().filter(meets).collect()
     }
 
     /// Returns the linear functions of a tetrahedron; `None` if it is flat in 32 bits.
