@@ -1,6 +1,6 @@
 //! The field of a sheet at eight pixels: a parabola along each ray.
 
-use super::vector::{Lanes, each, three};
+use super::vector::Lanes;
 use fearless_simd::{Simd, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
@@ -63,16 +63,11 @@ impl<S: Simd> Layer<S> {
     pub fn new(
         simd: S,
         direction: [Lanes<S>; 3],
-        faces: [Face<S>; 2],
+        [front, back]: [Face<S>; 2],
         middle: Lanes<S>,
         [start, thickness]: [Lanes<S>; 2],
         [begin, end]: [Lanes<S>; 2],
     ) -> Self {
-        let [front, back] = each!([0, 1], N => {
-            let Face { value, across } = &faces[N];
-            // Vector by vector: a copy would wait until all are written.
-            Face { value: *value, across: three!(I => across[I]) }
-        });
         Self {
             front,
             back,

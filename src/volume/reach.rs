@@ -112,8 +112,8 @@ impl Joined {
             let below = |other: u8| u16::from(own.saturating_sub(other));
             // At most all that it lies above them, as the shares are at most 1.
             let down = (below(near) * near_share + below(far) * far_share + 255) >> 8;
-            // If it lies below all of them, they raise the mean. At the border some of them weigh
-            // nothing, but there a repeated sample is no higher.
+            // Others raise the mean of a sample that lies below all of them. One at the border is
+            // its own neighbour, so nothing raises it: samples outside weigh nothing.
             let up = (u16::from(near.min(far).saturating_sub(*own)) * others_share) >> 8;
             *out = own - down as u8 + up as u8;
         }
